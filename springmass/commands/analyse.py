@@ -32,6 +32,8 @@ from springmass.commands.questions import for_command, option_words
 from springmass.errors import HINT, LOG, OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError
 from springmass.layout import STDIN
 from springmass.loading.inputs import files_of
+from springmass.loading.notes import keep_answers
+from springmass.loading.options import LoadOptions
 from springmass.loading.scenes import read_scenes
 from springmass.result.output_names import distinct_names, in_a_name, make_folder, safe_name
 from springmass.result.run_json import rejected
@@ -55,6 +57,7 @@ class AnalyseOptions:
         FURTHER_OPTIONS,
     ] = None
     output: Annotated[FileArgument | None, output("DIR", "output folder (default: here; with --json: none)")] = None
+    keep: Annotated[bool, flag("keep the options of reading in the notes next to the file")] = False
     no_report: Annotated[bool, flag("print the results, but write no files")] = False
     full: Annotated[bool, flag("print all warnings and notes, and the sources of uncertainty")] = False
     template: Annotated[
@@ -78,6 +81,8 @@ def analyse(
 ) -> int:
     """Analyse every input; if one fails, the others still give results."""
     inputs, how = [str(each) for each in recordings], analysis.of(read, options.method)
+    if options.keep and (not read.about_the_file().given() or STDIN in inputs):
+        raise ProgramError("--keep keeps options of reading such as --unit next to a file; give one, and the file")
     if how.velocity is not None and (len(inputs) > 1 or Path(inputs[0]).is_dir()):
         got = f"{len(inputs)} inputs" if len(inputs) > 1 else "a folder"
         raise ProgramError(f"--velocity completes one position file, got {got}; analyse the pair by itself")
@@ -94,7 +99,7 @@ def analyse(
     ]
     out = Path(options.output or ".") if not options.no_report and (options.output or not options.json) else None
     if not alone:
-        return _several(tasks, inputs, options, out)
+        return _several(tasks, inputs, options, out, read)
     (run,) = analyse_all(tasks)
     if isinstance(run, Failed):
         if run.question is not None and inputs == [files[0].path]:
@@ -105,6 +110,7 @@ def analyse(
     else:
         _print_text(run, options)
     written = OK if out is None else _write(out / _results_name(run), [run], options)
+    _keep([run], read, options)
     return max(_judged(run, options), written)
 
 
@@ -120,7 +126,9 @@ def _results_name(run: Run) -> str:
     return in_a_name(f"{name}.{safe}" if safe else name, ".results")
 
 
-def _several(tasks: Sequence[Task], inputs: Sequence[str], options: AnalyseOptions, out: Path | None) -> int:
+def _several(
+    tasks: Sequence[Task], inputs: Sequence[str], options: AnalyseOptions, out: Path | None, read: LoadOptions
+) -> int:
     """Analyse many inputs: one Table 1 and one report."""
     from springmass.terminal.progress import counted
 
@@ -137,12 +145,23 @@ def _several(tasks: Sequence[Task], inputs: Sequence[str], options: AnalyseOptio
     if runs and not options.json:
         _print_together(runs, options)
     written = _write(out / TOGETHER, runs, options) if runs and out is not None else OK
+    _keep(runs, read, options)
     if len(runs) > 1:
         named = shlex.join(inputs)
         LOG.log(HINT, f"springmass compare {named if len(named) <= LONGEST_INPUTS else '...'}")
     if len(set(codes)) > 1 and any(code not in (OK, REJECTED) for code in codes):
         return SOME_FAILED
     return max(*codes, written)
+
+
+def _keep(runs: Sequence[Run], read: LoadOptions, options: AnalyseOptions) -> None:
+    """Keep what was stated about the files in the notes next to them, or say how to."""
+    given = read.about_the_file().given()
+    for run in runs if options.keep else ():
+        path = keep_answers(run.loaded.path, given, run.loaded.sha256)
+        LOG.info(f"{path}: {', '.join(given)} kept, used from now on with {run.loaded.path.name}")
+    if runs and given.keys() - {"velocity"} and not options.keep:
+        LOG.log(HINT, "the same command with --keep saves the options of reading next to the file")
 
 
 def _failed(failed: Failed) -> int:

@@ -30,7 +30,7 @@ from springmass.course.results_csv import RESERVED
 from springmass.errors import UNREADABLE, ProgramError
 from springmass.layout import part
 from springmass.loading.inputs import InputFile, files_of
-from springmass.loading.notes import about_path
+from springmass.loading.notes import notes_paths
 from springmass.loading.options import ANALYSIS_DEFAULTS, AnalysisOptions
 from springmass.loading.scenes import read_scene
 from springmass.result.output_names import numbered
@@ -53,7 +53,7 @@ def digests_of(task: Task) -> dict[str, str]:
 
 def made_of(task: Task) -> str:
     """Return a digest of all on which the run's row and report depend; this reads the files."""
-    files = (task.source, task.how.velocity, about_path(Path(task.source)))
+    files = (task.source, task.how.velocity, *notes_paths(Path(task.source)))
     read = [digest_of(str(path)) if path else "" for path in files]
     return _digest([*read, digests_of(task), software()])
 

@@ -17,7 +17,7 @@ from springmass.errors import LOG, UNREADABLE, ProgramError
 from springmass.layout import STDIN, part
 from springmass.loading.inputs import kind_of
 from springmass.loading.loaded import UNVERIFIED, Loaded, sha256_of
-from springmass.loading.notes import about_of
+from springmass.loading.notes import about_of, answers_of
 from springmass.loading.options import LOAD_DEFAULTS, LoadOptions
 from springmass.loading.track import to_track
 from storage.errors import RunDamaged
@@ -37,7 +37,14 @@ def load(path: str | Path, options: LoadOptions = LOAD_DEFAULTS, *, scene_given:
     if str(path) == STDIN:
         return _load_stdin(options)
     where = Path(path)
-    kind = kind_of(where)
+    kind, kept = kind_of(where), answers_of(where)
+    from_notes = kept.beside(options.about_the_file().given())
+    options = replace(options, **from_notes)
+    about = about_of(where)
+    noted = [f"{name} {value}" for name, value in from_notes.items()]
+    noted += filter(None, [about.described(scene=not scene_given)])
+    if from_notes:  # said first, because they may be the reason why the file cannot be read
+        LOG.info(f"{kept.path}: {', '.join(noted)} read from the notes next to the file")
     if kind == "run":
         _refuse(where, "a run file", options, ())
         loaded = _load_run(where, unverified=options.unverified)
@@ -49,19 +56,20 @@ def load(path: str | Path, options: LoadOptions = LOAD_DEFAULTS, *, scene_given:
     for trap in loaded.traps:
         if trap.code == UNVERIFIED:
             LOG.warning(f"{where}: {trap.message}")
-    about = about_of(where)
-    if described := about.described(scene=not scene_given):
-        LOG.info(f"{about.path}: {described} read from the notes next to the file")
+    if from_notes and kept.sha256 not in ("", loaded.sha256):
+        LOG.warning(f"{kept.path}: {where.name} has changed since it was stated how to read it; check [reading]")
+    if noted and not from_notes:
+        LOG.info(f"{about.path}: {', '.join(noted)} read from the notes next to the file")
     if about.described():
         scene = loaded.scene if about.scene is None else about.scene.to_mapping()
         marks = [*loaded.provenance.get("marks", ()), *({"t_s": t_s, "text": text} for t_s, text in about.marks)]
-        noted = {"marks": marks} if marks else {}
+        added = {"marks": marks} if marks else {}
         if about.notes:
-            noted["notes"] = list(about.notes)
-        loaded = replace(loaded, scene=scene, provenance={**loaded.provenance, **noted})
+            added["notes"] = list(about.notes)
+        loaded = replace(loaded, scene=scene, provenance={**loaded.provenance, **added})
     summary = f"{loaded.format}, {len(loaded.samples)} samples of {loaded.samples.quantity}"
     LOG.debug(f"read: {where}: {summary} at {loaded.info.rate_hz:g} Hz, clock: {loaded.info.clock}")
-    return loaded
+    return replace(loaded, reading=options.about_the_file().given())
 
 
 def _load_stdin(options: LoadOptions) -> Loaded:

@@ -25,7 +25,8 @@ class Loaded:
     ``format`` is the family that read it, "run" for a run file, "wire" for a wire log, "memory" for arrays;
     ``recorded_format`` is the family of the recording inside a run file. ``scene`` comes from the notes next to the
     file, or else from inside a run file. ``kept`` are the original files; those inside a run file are read when they
-    are needed. ``sha256`` is the digest of the file's bytes, empty for arrays and for an empty wire log.
+    are needed. ``reading`` are the options with which the file was read, by name. ``sha256`` is the digest of the
+    file's bytes, empty for arrays and for an empty wire log.
     """
 
     path: Path
@@ -42,6 +43,7 @@ class Loaded:
     recorded_format: str = ""
     sha256: str = ""
     kept: tuple[Original, ...] | None = ()
+    reading: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def originals(self) -> tuple[Original, ...]:

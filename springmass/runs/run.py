@@ -82,6 +82,7 @@ class Run(Mapping[str, Value]):
         """Return the run of a path, arrays, or another run; ``scene`` is one, its tables, or the path of its file."""
         if isinstance(source, str | os.PathLike):
             loaded = within(load(Path(source), how, scene_given=scene is not None), how)
+            how = replace(how, **loaded.reading)
         elif isinstance(source, Run):
             refuse_reading(how)
             loaded = within(source.loaded, how)
