@@ -19,7 +19,7 @@ from springmass.commands.options import (
     FiguresOption,
     FileArgument,
     Json,
-    ReadArguments,
+    ReadPairs,
     Scenes,
     Strict,
     refuse,
@@ -66,12 +66,12 @@ def compare(
         FileArgument, argument("RUN", "two or more runs of one spring, or folders from batch", required=True)
     ],
     options: CompareOptions = CompareOptions(),
-    read: ReadArguments = ReadArguments(),
+    reading: ReadPairs = ReadPairs(),
     analysis: AnalysisArguments = AnalysisArguments(),
 ) -> int:
     """Analyse every run, compare them, and print or write the result; for courses use the existing results."""
-    refuse("compare", read, "velocity")
-    how = analysis.of(read)
+    refuse("compare", reading.options, "velocity")
+    how = analysis.of(reading.options)
     inputs = [str(each) for each in recordings]
     if all(is_course(path) for path in inputs):
         return _run_courses(inputs, options)

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Group, Parameter, Token
 
-from acquisition.recordings.reading import READ_FIELDS, Kind
+from acquisition.recordings.reading import READ_FIELDS, Kind, value_of
 from springmass.commands.parameters import Finite, LawName, PartsPerMillion, Positive, TcpPort, argument, flag, option
-from springmass.commands.questions import option_of
 from springmass.errors import ProgramError
 from springmass.loading.options import Accuracy, AnalysisOptions, LoadOptions
 
@@ -159,6 +158,31 @@ else:
     )
 
 
+def _answer(text: str) -> tuple[str, Any]:
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise ValueError("must be KEY=VALUE, for example unit=cm")
+    name = name.strip().replace("-", "_")
+    return name, value_of(name, value)
+
+
+@Parameter(name="*", group=Group("Options", sort_key=1))
+@dataclass(frozen=True, kw_only=True)
+class ReadPairs:
+    """The options of reading as one option, for commands that usually find them in the notes next to a file."""
+
+    read: Annotated[
+        tuple[tuple[str, Any], ...],
+        converted("KEY=VALUE", "how to read the file: unit=cm, rate_hz=100 ...; may be repeated", _answer),
+    ] = ()
+    unverified: _UNVERIFIED = False
+
+    @property
+    def options(self) -> LoadOptions:
+        """The options of reading."""
+        return LoadOptions(**dict(self.read), unverified=self.unverified)
+
+
 @Parameter(name="*", group=Group("Options", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
 class AnalysisArguments:
@@ -179,5 +203,5 @@ class AnalysisArguments:
 
 def refuse(command: str, read: LoadOptions, *names: str) -> None:
     """Refuse options of reading that mean nothing to a command."""
-    if given := [option_of(name) for name in read.given() if name in names]:
+    if given := [name for name in read.given() if name in names]:
         raise ProgramError(f"{', '.join(given)}: {command} has no use for it; leave it out")

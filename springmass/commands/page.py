@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from springmass.commands.options import PageOptions, ReadArguments, RecordingArgument
+from springmass.commands.options import PageOptions, ReadPairs, RecordingArgument
 from springmass.commands.parameters import flag
 from springmass.errors import LOG, OK, ProgramError
 from springmass.loading.inputs import kind_of
@@ -27,7 +27,7 @@ def page(
     /,
     *,
     page: PageOptions = PageOptions(),
-    read: ReadArguments = ReadArguments(),
+    reading: ReadPairs = ReadPairs(),
     recorder: Annotated[bool, flag("used internally by `record --page`")] = False,
 ) -> int:
     """Serve the page until Ctrl-C; for a recording, until the recorder has ended and no browser shows the page."""
@@ -46,7 +46,7 @@ def page(
     elif kind_of(path) == "wire":
         state.follow(path)
     else:
-        loaded = load(path, read)
+        loaded = load(path, reading.options)
         state.show(view_of(loaded), loaded.scene, loaded.path)
 
     def opened(address: str, share: str) -> None:
