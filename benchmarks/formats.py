@@ -35,7 +35,8 @@ AGAIN = f"; g = f; f = lambda p: [g(p) for _ in range({TIMES})]"  # a short file
 PANDAS = "import pandas; f = lambda p: pandas.read_csv(p, sep='\\t', skiprows=1, engine='c')"
 LVM = "import acquisition.recordings.families.motion_sensor, acquisition.recordings.families.lvm; "
 LVM += "from acquisition.recordings.identify import open_recording; "
-LVM += "f = lambda p: open_recording(p, channel='Acceleration_0', unit='m')"
+LVM += "from acquisition.recordings.reading import ReadOptions; "
+LVM += "f = lambda p: open_recording(p, ReadOptions(channel='Acceleration_0', unit='m'))"
 LVM_READ = "from lvm_read import read; f = lambda p: read(p, read_from_pickle=False, dump_file=False)"
 
 TIMED = """

@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from acquisition.recordings.identify import open_recording
+from acquisition.recordings.reading import ReadOptions
 from benchmarks import course, day, dynamics, formats, page, ports, ratios, recording, trade
 
 Figures = Iterator[tuple[str, float, float, float]]  # name, lowest, measured and highest value
@@ -55,7 +56,7 @@ def trajectories(_: Path) -> Figures:
 def rows_of_files(folder: Path) -> Figures:
     """Each row of the compared files gives a sample, and none is flagged."""
     text = open_recording(formats.write_motion_sensor(folder / "run.txt", 100_000))
-    lvm = open_recording(formats.write_lvm(folder / "run.lvm", 300), channel="Acceleration_1", unit="m")
+    lvm = open_recording(formats.write_lvm(folder / "run.lvm", 300), ReadOptions(channel="Acceleration_1", unit="m"))
     for opened, rows, rate_hz in ((text, 100_000, 100.0), (lvm, 300, 51200.0)):
         yield "usable rows", rows, (opened.samples.flags == 0).sum(), rows
         yield "rate, Hz", rate_hz, opened.info.rate_hz, rate_hz

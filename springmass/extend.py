@@ -18,6 +18,7 @@ from acquisition.errors import FormatError, NeedsAnswer, SensorError
 from acquisition.readings import Reading, Readings
 from acquisition.recordings.families.user_dialects import dialect
 from acquisition.recordings.questions import Missing, MissingItem, Question
+from acquisition.recordings.reading import ReadOptions
 from acquisition.recordings.recording import Format, FormatIssue, Original, Recording, SurveyFormat
 from acquisition.recordings.sampling.timing import Formula
 from acquisition.recordings.tables.format import ColumnFormat, text_format
@@ -36,9 +37,9 @@ __all__ = [
     "AnalysisError", "Block", "Clock", "Column", "ColumnFormat", "Decoder", "DynamicsError", "Encoder", "Equation",
     "Flag", "Format", "FormatError", "FormatIssue", "Formula", "FramedDecoder", "Header", "Heading", "Identity",
     "Integrator", "Law", "LineSplitter", "Missing", "MissingItem", "NeedsAnswer", "OneStep", "Original", "Poll",
-    "Problem", "Question", "Reading", "Readings", "Recording", "Sensor", "SensorError", "SourceInfo", "SumFrames",
-    "SurveyFormat", "SystemClock", "Table", "Trajectory", "Unit", "VirtualClock", "acceleration", "auto", "dialect",
-    "get_integrator", "make_law", "text_format", "with_sum",
+    "Problem", "Question", "ReadOptions", "Reading", "Readings", "Recording", "Sensor", "SensorError", "SourceInfo",
+    "SumFrames", "SurveyFormat", "SystemClock", "Table", "Trajectory", "Unit", "VirtualClock", "acceleration", "auto",
+    "dialect", "get_integrator", "make_law", "text_format", "with_sum",
 ]
 # fmt: on
 

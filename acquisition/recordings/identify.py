@@ -12,11 +12,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path, PurePath
-from typing import Any, cast
+from typing import cast
 
 from platformdirs import user_config_path
 
 from acquisition.errors import AcquisitionError, FormatError, UnknownFormat
+from acquisition.recordings.reading import READ_DEFAULTS, ReadOptions
 from acquisition.recordings.recording import Format, Recording, Survey, SurveyFormat
 from acquisition.recordings.tables.text import HEAD_BYTES, head_lines, is_text, restated
 from acquisition.regular_file import open_regular
@@ -69,49 +70,47 @@ def sniff(path: str | os.PathLike[str]) -> str:
 
 
 def open_recording(
-    path: str | os.PathLike[str],
-    *,
-    format: str | None = None,
-    velocity_path: str | os.PathLike[str] | None = None,
-    delimiter: str | None = None,
-    decimal: str | None = None,
-    **answers: Any,
+    path: str | os.PathLike[str], reading: ReadOptions = READ_DEFAULTS, *, format: str | None = None
 ) -> Recording:
     """Read a recording of another program; if anything is missing or faulty, the error says so in one line.
 
-    By default the format is identified by content. The answers are what the file does not state or leaves open; see
-    :meth:`springmass.extend.Format.read`. A velocity file is joined with the position file by time. The separator of
-    cells and the decimal mark of a text are found out unless they are stated.
+    By default the format is identified by content. ``reading`` states what the file does not state or leaves open. A
+    velocity file is joined with the position file by time. The separator of cells and the decimal mark of a text are
+    found out unless they are stated.
     """
     name = os.fspath(path)
-    reader, original, data = _opened(name, format, delimiter, decimal)
-    if velocity_path is not None:
+    reader, original, data = _opened(name, format, reading)
+    of_format = replace(reading, velocity=None, delimiter=None, decimal=None)
+    if reading.velocity is not None:
         read_pair = getattr(reader, "read_pair", None)
         if read_pair is None:
-            problem = f"format {reader.name} has no velocity files, got {os.fspath(velocity_path)}"
+            problem = f"format {reader.name} has no velocity files, got {os.fspath(reading.velocity)}"
             raise UnknownFormat(name, problem, "leave the velocity file out")
-        velocity = (os.fspath(velocity_path), read_bytes(velocity_path))
-        return cast(Recording, read_pair((name, data), velocity, rate_hz=answers.get("rate_hz")))
-    recording = reader.read(name, data, **{name: answer for name, answer in answers.items() if answer is not None})
+        if others := sorted(of_format.given().keys() - {"rate_hz"}):
+            problem = f"position and velocity files state all but their rate, got {', '.join(others)} too"
+            raise FormatError(name, problem, "leave that out")
+        velocity = (os.fspath(reading.velocity), read_bytes(reading.velocity))
+        return cast(Recording, read_pair((name, data), velocity, of_format))
+    recording = reader.read(name, data, of_format)
     if data is original:
         return recording
     return replace(recording, originals=(replace(recording.originals[0], data=original), *recording.originals[1:]))
 
 
-def inspect(path: str | os.PathLike[str], *, delimiter: str | None = None, decimal: str | None = None) -> Inspection:
+def inspect(path: str | os.PathLike[str], reading: ReadOptions = READ_DEFAULTS) -> Inspection:
     """Return the format and the content of a file, before a channel is chosen."""
     name = os.fspath(path)
-    reader, _, data = _opened(name, None, delimiter, decimal)
+    reader, _, data = _opened(name, None, reading)
     if not isinstance(reader, SurveyFormat):
         return Inspection(reader.name, reader.title, "", ())
     return Inspection(reader.name, reader.title, reader.evidence(data[:HEAD_BYTES]), reader.survey(name, data))
 
 
-def _opened(path: str, format: str | None, delimiter: str | None, decimal: str | None) -> tuple[Format, bytes, bytes]:
+def _opened(path: str, format: str | None, reading: ReadOptions) -> tuple[Format, bytes, bytes]:
     """Return the format of a file, its bytes, and its bytes as they are to be read."""
-    if delimiter or decimal:
+    if reading.delimiter or reading.decimal:
         original = read_bytes(path)
-        data = restated(path, original, delimiter, decimal)
+        data = restated(path, original, reading.delimiter, reading.decimal)
         return get_format(format) if format else _recognise(path, data[:HEAD_BYTES]), original, data
     reader = get_format(format) if format else _recognise(path, read_bytes(path, HEAD_BYTES))
     data = read_bytes(path)

@@ -14,7 +14,7 @@ _MOST_LISTED = 8
 
 
 class Missing(StrEnum):
-    """The kinds of missing items. The value is the keyword argument of ``open_recording`` that gives the answer."""
+    """The kinds of missing items. The value is the name of the option of reading that gives the answer."""
 
     RUN = "run"
     CHANNEL = "channel"
@@ -110,7 +110,7 @@ class Question:
 
     @property
     def examples(self) -> dict[str, str | float]:
-        """Keyword arguments of ``open_recording`` that answer the whole question."""
+        """Options of reading, by name, that answer the whole question."""
         return {need.what.value: need.example for need in self.needs}
 
     @property

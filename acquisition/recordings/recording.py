@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
 from acquisition.block import Block, SourceInfo
+from acquisition.recordings.reading import READ_DEFAULTS, ReadOptions
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,19 +108,8 @@ class Format(Protocol):
         This must be fast and never raise.
         """
 
-    def read(
-        self,
-        path: str,
-        data: bytes,
-        *,
-        channel: str | None = None,
-        rate_hz: float | None = None,
-        unit: str | None = None,
-        run: str | None = None,
-        time: str | None = None,
-        time_unit: str | None = None,
-    ) -> Recording:
-        """Read one channel of one run of a file."""
+    def read(self, path: str, data: bytes, reading: ReadOptions = READ_DEFAULTS) -> Recording:
+        """Read one channel of one run of a file, with what the user states about it."""
 
 
 @dataclass(frozen=True, slots=True)

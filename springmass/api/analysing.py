@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 
 class ReadKeywords(TypedDict, total=False):
-    """How a recording is read: what its file leaves out, and which part of it is used."""
+    """How a recording is read: the fields of :class:`springmass.loading.options.LoadOptions` for checkers of types."""
 
     velocity: str | os.PathLike[str] | None
     channel: str | None
@@ -48,15 +48,15 @@ class ReadKeywords(TypedDict, total=False):
     time_unit: str | None
     delimiter: str | None
     decimal: str | None
-    from_s: float | None
-    to_s: float | None
-    clock_ppm: float | None
     unverified: bool
 
 
 class AnalysisKeywords(ReadKeywords, total=False):
     """How a recording is read and analysed."""
 
+    from_s: float | None
+    to_s: float | None
+    clock_ppm: float | None
     accuracy: Accuracy
     law: str | Law | None
     laws: Sequence[str | Law | EllipsisType] | None

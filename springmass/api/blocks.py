@@ -24,7 +24,7 @@ from springmass.api.analysing import AnyScene, ReadKeywords
 from springmass.errors import UNREADABLE, ProgramError
 from springmass.loading.load import load
 from springmass.loading.loaded import Loaded
-from springmass.loading.options import ReadOptions
+from springmass.loading.options import LoadOptions
 from springmass.loading.save import made_now, save_run
 from springmass.loading.scenes import scene_from
 from springmass.session.detect import name_sensors
@@ -104,7 +104,7 @@ def source(
     >>> stream.finish()["T"]
     0.758516(22) s
     """
-    read = ReadOptions.of(how)
+    read = LoadOptions.of(how)
     of_port = {"sensor": sensor, "baud": baud}
     if isinstance(what, Scene | Mapping):
         _refuse("a simulated bench", {"scene": scene, **of_port, **how})

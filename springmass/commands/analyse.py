@@ -23,6 +23,7 @@ from springmass.commands.options import (
     FiguresOption,
     FileArgument,
     Json,
+    ReadArguments,
     Scenes,
     Strict,
 )
@@ -31,6 +32,8 @@ from springmass.commands.questions import for_command, option_words
 from springmass.errors import HINT, LOG, OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError
 from springmass.layout import STDIN
 from springmass.loading.inputs import files_of
+from springmass.loading.notes import keep_answers
+from springmass.loading.options import LoadOptions
 from springmass.loading.scenes import read_scenes
 from springmass.result.output_names import distinct_names, make_folder, results_name
 from springmass.result.run_json import rejected
@@ -54,6 +57,7 @@ class AnalyseOptions:
         FURTHER_OPTIONS,
     ] = None
     output: Annotated[FileArgument | None, output("DIR", "output folder (default: here; with --json: none)")] = None
+    keep: Annotated[bool, flag("keep the options of reading in the notes next to the file")] = False
     no_report: Annotated[bool, flag("print the results, but write no files")] = False
     full: Annotated[bool, flag("print all warnings and notes, and the sources of uncertainty")] = False
     template: Annotated[
@@ -71,11 +75,14 @@ def analyse(
         argument("INPUT", "recordings, run files or folders of these; - for standard input", required=True),
     ],
     options: AnalyseOptions = AnalyseOptions(),
-    how: AnalysisArguments = AnalysisArguments(),
+    read: ReadArguments = ReadArguments(),
+    analysis: AnalysisArguments = AnalysisArguments(),
     bench: BenchOptions = BenchOptions(),
 ) -> int:
     """Analyse every input; if one fails, the others still give results."""
-    inputs = [str(each) for each in recordings]
+    inputs, how = [str(each) for each in recordings], analysis.of(read, options.method)
+    if options.keep and (not read.about_the_file().given() or STDIN in inputs):
+        raise ProgramError("--keep keeps options of reading such as --unit next to a file; give one, and the file")
     if how.velocity is not None and (len(inputs) > 1 or Path(inputs[0]).is_dir()):
         got = f"{len(inputs)} inputs" if len(inputs) > 1 else "a folder"
         raise ProgramError(f"--velocity completes one position file, got {got}; analyse the pair by itself")
@@ -85,7 +92,6 @@ def analyse(
         LOG.info(line)
     alone = len(files) == 1
     names = [""] if alone else distinct_names(["stdin" if file.path == STDIN else file.path for file in files])
-    how = replace(how, method=options.method)
     of_files = [how if file.velocity is None else replace(how, velocity=file.velocity) for file in files]
     tasks = [
         Task(file.path, name, scenes[file.of], of_file, values)
@@ -93,7 +99,7 @@ def analyse(
     ]
     out = Path(options.output or ".") if not options.no_report and (options.output or not options.json) else None
     if not alone:
-        return _several(tasks, inputs, options, out)
+        return _several(tasks, inputs, options, out, read)
     (run,) = analyse_all(tasks)
     if isinstance(run, Failed):
         if run.question is not None and inputs == [files[0].path]:
@@ -105,10 +111,13 @@ def analyse(
         _print_text(run, options)
     name = results_name(run.loaded.path, run=how.run, channel=how.channel)
     written = OK if out is None else _write(out / name, [run], options)
+    _keep([run], read, options)
     return max(_judged(run, options), written)
 
 
-def _several(tasks: Sequence[Task], inputs: Sequence[str], options: AnalyseOptions, out: Path | None) -> int:
+def _several(
+    tasks: Sequence[Task], inputs: Sequence[str], options: AnalyseOptions, out: Path | None, read: LoadOptions
+) -> int:
     """Analyse many inputs: one Table 1 and one report."""
     from springmass.terminal.progress import counted
 
@@ -125,12 +134,23 @@ def _several(tasks: Sequence[Task], inputs: Sequence[str], options: AnalyseOptio
     if runs and not options.json:
         _print_together(runs, options)
     written = _write(out / TOGETHER, runs, options) if runs and out is not None else OK
+    _keep(runs, read, options)
     if len(runs) > 1:
         named = shlex.join(inputs)
         LOG.log(HINT, f"springmass compare {named if len(named) <= LONGEST_INPUTS else '...'}")
     if len(set(codes)) > 1 and any(code not in (OK, REJECTED) for code in codes):
         return SOME_FAILED
     return max(*codes, written)
+
+
+def _keep(runs: Sequence[Run], read: LoadOptions, options: AnalyseOptions) -> None:
+    """Keep what was stated about the files in the notes next to them, or say how to."""
+    given = read.about_the_file().given()
+    for run in runs if options.keep else ():
+        path = keep_answers(run.loaded.path, given, run.loaded.sha256)
+        LOG.info(f"{path}: {', '.join(given)} kept, used from now on with {run.loaded.path.name}")
+    if runs and given.keys() - {"velocity"} and not options.keep:
+        LOG.log(HINT, "the same command with --keep saves the options of reading next to the file")
 
 
 def _failed(failed: Failed) -> int:

@@ -9,7 +9,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from springmass.commands.options import AnalysisArguments, FileArgument, refuse
+from springmass.commands.options import AnalysisArguments, FileArgument, ReadPairs, refuse
 from springmass.commands.parameters import PositiveCount, WholeNumber, argument, flag, option, output
 from springmass.commands.questions import for_course
 from springmass.course.page import COURSE_PAGE, GROUPS_FILE
@@ -46,10 +46,12 @@ class BatchOptions:
 def batch(
     *recordings: Annotated[FileArgument, argument("INPUT", "recordings, folders (with subfolders), or patterns")],
     options: BatchOptions = BatchOptions(),
-    how: AnalysisArguments = AnalysisArguments(),
+    reading: ReadPairs = ReadPairs(),
+    analysis: AnalysisArguments = AnalysisArguments(),
 ) -> int:
     """Analyse new and changed runs, and write the table and the page of all runs."""
-    refuse("batch", how, "velocity")
+    refuse("batch", reading.options, "velocity")
+    how = analysis.of(reading.options)
     inputs = [str(each) for each in recordings]
     if not inputs and options.runs is None:
         raise ProgramError("batch needs recordings, folders or --runs FILE, got none of them")

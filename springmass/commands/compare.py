@@ -14,7 +14,16 @@ from cyclopts import Parameter
 
 from acquisition.errors import visible
 from pipeline.findings.finding import kinds
-from springmass.commands.options import AnalysisArguments, FiguresOption, FileArgument, Json, Scenes, Strict, refuse
+from springmass.commands.options import (
+    AnalysisArguments,
+    FiguresOption,
+    FileArgument,
+    Json,
+    ReadPairs,
+    Scenes,
+    Strict,
+    refuse,
+)
 from springmass.commands.parameters import Share, argument, option, output
 from springmass.comparing.comparison import SpringComparison, compare_runs, comparison_json, line_and_hooke_words
 from springmass.course.results_csv import COURSE, is_course, read_rows
@@ -57,10 +66,12 @@ def compare(
         FileArgument, argument("RUN", "two or more runs of one spring, or folders from batch", required=True)
     ],
     options: CompareOptions = CompareOptions(),
-    how: AnalysisArguments = AnalysisArguments(),
+    reading: ReadPairs = ReadPairs(),
+    analysis: AnalysisArguments = AnalysisArguments(),
 ) -> int:
     """Analyse every run, compare them, and print or write the result; for courses use the existing results."""
-    refuse("compare", how, "velocity")
+    refuse("compare", reading.options, "velocity")
+    how = analysis.of(reading.options)
     inputs = [str(each) for each in recordings]
     if all(is_course(path) for path in inputs):
         return _run_courses(inputs, options)

@@ -8,7 +8,7 @@ from pathlib import Path, PurePath
 from typing import Annotated
 
 from acquisition.recordings.writers import WRITERS
-from springmass.commands.options import PART, FileArgument, Overwrite, ReadArguments, refuse
+from springmass.commands.options import FileArgument, Overwrite, ReadArguments
 from springmass.commands.parameters import argument, option, output
 from springmass.errors import HINT, LOG, OK, UNREADABLE, ProgramError
 from springmass.loading.load import load
@@ -34,7 +34,6 @@ def convert(
     read: ReadArguments = ReadArguments(),
 ) -> int:
     """Convert one input."""
-    refuse("convert", read, *PART)
     if output is not None and target is not None:
         raise ProgramError(f"convert writes one output, got {target} and -o {output}; name it once")
     if (output := target or output) is None:

@@ -13,7 +13,7 @@ from springmass.commands.parameters import output
 from springmass.comparing.comparison import compare_runs
 from springmass.errors import HINT, LOG, OK
 from springmass.loading.load import load, sample_data
-from springmass.loading.options import ReadOptions
+from springmass.loading.options import LoadOptions
 from springmass.loading.save import save_run
 from springmass.loading.scenes import read_scene
 from springmass.report.write import write_report
@@ -50,7 +50,7 @@ def _one(name: str, out: Path) -> Run:
     """Replay the old files into a run file, and analyse that run file."""
     data = sample_data()
     velocity = data / f"{name}_simulated_velocity.txt"
-    old = load(data / f"{name}_simulated_position.txt", ReadOptions(velocity=velocity))
+    old = load(data / f"{name}_simulated_position.txt", LoadOptions(velocity=velocity))
     scene = read_scene(data / f"{name}.scene.toml")
     path = out / f"{name}.h5"
     with Replay(old.samples_in_blocks(), VirtualClock(), info=old.info, speed=None) as source:

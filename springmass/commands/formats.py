@@ -14,14 +14,14 @@ from acquisition.errors import NeedsAnswer, visible
 from acquisition.recordings.identify import Inspection, inspect
 from acquisition.recordings.identify import formats as every_format
 from acquisition.recordings.recording import Survey
-from springmass.commands.options import PART, FileArgument, Json, ReadArguments, refuse
+from springmass.commands.options import FileArgument, Json, ReadArguments
 from springmass.commands.parameters import argument
 from springmass.commands.questions import for_command, option_words
 from springmass.errors import HINT, LOG, OK
 from springmass.loading.inputs import kind_of
 from springmass.loading.load import load
 from springmass.loading.loaded import Loaded
-from springmass.loading.options import ReadOptions
+from springmass.loading.options import LoadOptions
 from springmass.result.run_json import picked, plain
 
 OURS = {
@@ -39,7 +39,6 @@ def formats(
     read: ReadArguments = ReadArguments(),
 ) -> int:
     """List the formats, or describe a file."""
-    refuse("formats", read, *PART)
     if file is None:
         table = {**{f.name: f.title for f in every_format()}, **OURS}
         lines = [f"{name:<16} {title}" for name, title in table.items()]
@@ -58,7 +57,7 @@ def formats(
     return OK
 
 
-def _describe(path: Path, read: ReadOptions, *, as_json: bool) -> dict[str, Any]:
+def _describe(path: Path, read: LoadOptions, *, as_json: bool) -> dict[str, Any]:
     """Identify a file; if one channel can be used as distance, also describe its samples."""
     kind = kind_of(path)
     if kind != "recording":
@@ -66,7 +65,7 @@ def _describe(path: Path, read: ReadOptions, *, as_json: bool) -> dict[str, Any]
         samples = loaded.samples
         survey = Survey("", loaded.channel, samples.unit, len(samples), loaded.info.rate_hz, loaded.traps)
         return {**_file(path, Inspection(kind, OURS[kind], WHY[kind], (survey,))), **_facts(loaded)}
-    inspection = inspect(path, delimiter=read.delimiter, decimal=read.decimal)
+    inspection = inspect(path, read.about_the_file())
     facts = _file(path, inspection)
     try:
         return {**facts, **_facts(load(path, read))}

@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import Field, dataclass, field, make_dataclass
 from pathlib import Path
-from types import EllipsisType
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Group, Parameter, Token
 
-from pipeline.damping.laws import Law
+from acquisition.recordings.reading import READ_FIELDS, Kind, value_of
 from springmass.commands.parameters import Finite, LawName, PartsPerMillion, Positive, TcpPort, argument, flag, option
-from springmass.commands.questions import option_of
 from springmass.errors import ProgramError
-from springmass.loading.options import Accuracy, AnalysisOptions, ReadOptions
+from springmass.loading.options import Accuracy, AnalysisOptions, LoadOptions
 
 FileArgument = str | Path
 """The name of a file; a shell completes it."""
 HOW_READ = Group("How the recording is read", sort_key=2)
-_HOW_ANALYSED = Parameter(group=Group("Options", sort_key=1))
 THE_PAGE = Group("The page", sort_key=4)
 FURTHER_OPTIONS = Parameter(group=Group("Further options", sort_key=4))
 """Marks an option that few people use, which the help shows below the others."""
@@ -135,54 +132,76 @@ class PageOptions:
     law: LawName = None
 
 
-@Parameter(name="*", group=HOW_READ)
-@dataclass(frozen=True, kw_only=True)
-class ReadArguments(ReadOptions):
-    """The options of reading as the command line has them, each with its words."""
+_TYPES = {Kind.NAME: str | None, Kind.POSITIVE: Positive | None, Kind.FILE: str | Path | None}
+_UNVERIFIED = Annotated[bool, flag("read a run file despite a checksum mismatch")]
 
-    velocity: Annotated[str | Path | None, option("FILE", "velocity file that belongs to the position file")] = None
-    channel: Annotated[
-        str | None, option("NAME", "channel to use if there are several; for a wire log, the sensor")
-    ] = None
-    run: Annotated[str | None, option("NAME", "run to use if there are several: name or number")] = None
-    rate_hz: Annotated[Positive | None, option("R", "samples per second if the file does not state them")] = None
-    unit: Annotated[str | None, option("U", "unit of the channel if the file does not state it: m, cm, rad, V ...")] = (
-        None
+
+def _declared(of: Field[Any]) -> tuple[str, Any, Any]:
+    """Return an option of reading as the command line declares it."""
+    kind, words = _TYPES[of.metadata["kind"]], option(of.metadata["metavar"], of.metadata["help"])
+    return of.name, Annotated[kind, words], field(default=None)
+
+
+if TYPE_CHECKING:
+    ReadArguments = LoadOptions
+else:
+    ReadArguments = Parameter(name="*", group=HOW_READ)(
+        make_dataclass(
+            "ReadArguments",
+            [*map(_declared, READ_FIELDS.values()), ("unverified", _UNVERIFIED, field(default=False))],
+            bases=(LoadOptions,),
+            # Cyclopts looks into a class only if it names the module that it comes from.
+            namespace={"__doc__": "The options of reading, each with its words.", "__module__": __name__},
+            frozen=True,
+            kw_only=True,
+        )
     )
-    time: Annotated[str | None, option("NAME", "column with the times if the file does not state it")] = None
-    time_unit: Annotated[
-        str | None, option("U", "unit of the times if the file does not state it: s, ms, us, min, h, d")
-    ] = None
-    delimiter: Annotated[
-        str | None, option("C", "separator of a text's cells, else found out: comma, tab, space, ';' ...")
-    ] = None
-    decimal: Annotated[str | None, option("C", "decimal mark of a text, else found out: . or ,")] = None
-    unverified: Annotated[bool, flag("read a run file despite a checksum mismatch")] = False
+
+
+def _answer(text: str) -> tuple[str, Any]:
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise ValueError("must be KEY=VALUE, for example unit=cm")
+    name = name.strip().replace("-", "_")
+    return name, value_of(name, value)
+
+
+@Parameter(name="*", group=Group("Options", sort_key=1))
+@dataclass(frozen=True, kw_only=True)
+class ReadPairs:
+    """The options of reading as one option, for commands that usually find them in the notes next to a file."""
+
+    read: Annotated[
+        tuple[tuple[str, Any], ...],
+        converted("KEY=VALUE", "how to read the file: unit=cm, rate_hz=100 ...; may be repeated", _answer),
+    ] = ()
+    unverified: _UNVERIFIED = False
+
+    @property
+    def options(self) -> LoadOptions:
+        """The options of reading."""
+        return LoadOptions(**dict(self.read), unverified=self.unverified)
+
+
+@Parameter(name="*", group=Group("Options", sort_key=1))
+@dataclass(frozen=True, kw_only=True)
+class AnalysisArguments:
+    """The options of an analysis as the command line has them, each with its words."""
+
     from_s: Annotated[Finite | None, option("S", "use samples from this time on, s", "--from")] = None
     to_s: Annotated[Finite | None, option("S", "use samples up to this time, s", "--to")] = None
     clock_ppm: Annotated[
         PartsPerMillion | None, option("PPM", "largest rate error of the sensor's clock (default: that of its family)")
     ] = None
+    accuracy: Annotated[Accuracy, option("TIER", "how much time to spend on accuracy (default: standard)")] = "standard"
+    law: LawName = None
+
+    def of(self, read: LoadOptions, method: Literal["classic"] | None = None) -> AnalysisOptions:
+        """Return the options of the analysis of a recording that is read in a given way."""
+        return AnalysisOptions(**vars(self), **read.given(), method=method)
 
 
-@Parameter(name="*", group=HOW_READ)
-@dataclass(frozen=True, kw_only=True)
-class AnalysisArguments(ReadArguments, AnalysisOptions):
-    """The options of reading and of the analysis as the command line has them, each with its words."""
-
-    accuracy: Annotated[
-        Accuracy, option("TIER", "how much time to spend on accuracy (default: standard)"), _HOW_ANALYSED
-    ] = "standard"
-    law: Annotated[LawName, _HOW_ANALYSED] = None
-    laws: Annotated[Sequence[str | Law | EllipsisType] | None, Parameter(parse=False)] = None
-    method: Annotated[Literal["classic"] | None, Parameter(parse=False)] = None
-
-
-PART = ("from_s", "to_s", "clock_ppm")
-"""The reading options of an analysis, which mean nothing to a command that takes every sample as it is."""
-
-
-def refuse(command: str, read: ReadOptions, *names: str) -> None:
+def refuse(command: str, read: LoadOptions, *names: str) -> None:
     """Refuse options of reading that mean nothing to a command."""
-    if given := [option_of(name) for name in read.given() if name in names]:
+    if given := [name for name in read.given() if name in names]:
         raise ProgramError(f"{', '.join(given)}: {command} has no use for it; leave it out")

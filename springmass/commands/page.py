@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from springmass.commands.options import PART, PageOptions, ReadArguments, RecordingArgument, refuse
+from springmass.commands.options import PageOptions, ReadPairs, RecordingArgument
 from springmass.commands.parameters import flag
 from springmass.commands.questions import option_words
 from springmass.errors import LOG, OK, ProgramError
@@ -28,11 +28,10 @@ def page(
     /,
     *,
     page: PageOptions = PageOptions(),
-    read: ReadArguments = ReadArguments(),
+    reading: ReadPairs = ReadPairs(),
     recorder: Annotated[bool, flag("used internally by `record --page`")] = False,
 ) -> int:
     """Serve the page until Ctrl-C; for a recording, until the recorder has ended and no browser shows the page."""
-    refuse("page", read, *PART)
     path = Path(recording)
     over = threading.Event()
     network = address_in_network() if page.lan else ""
@@ -49,8 +48,8 @@ def page(
     elif kind_of(path) == "wire":
         state.follow(path)
     else:
-        loaded = load(path, read)
-        state.show(view_of(loaded), loaded.scene, loaded.path, read.given())
+        loaded = load(path, reading.options)
+        state.show(view_of(loaded), loaded.scene, loaded.path, reading.options.given())
 
     def opened(address: str, share: str) -> None:
         lines = [f"page: {address}"]

@@ -6,6 +6,8 @@ import re
 import shlex
 from collections.abc import Mapping, Sequence
 
+from cyclopts.argument import Argument
+
 from acquisition.recordings.questions import Question
 from springmass.api.questions import is_given
 
@@ -39,22 +41,46 @@ def option_words(answers: Mapping[str, object]) -> list[str]:
     return words
 
 
-def as_options(answers: Mapping[str, object]) -> str:
-    """Return keyword arguments of :func:`springmass.load` as command-line options."""
-    return " ".join(map(quoted, option_words(answers)))
+def pair_words(answers: Mapping[str, object]) -> list[str]:
+    """Return options of reading as the words of a command that takes them as ``--read KEY=VALUE``."""
+    texts = {name: f"{value:.15g}" if isinstance(value, float) else str(value) for name, value in answers.items()}
+    return [word for name, text in texts.items() for word in ("--read", f"{name}={text}")]
 
 
 def for_command(question: Question, words: Sequence[str]) -> str:
-    """Return a command line with the answers to a question in place of those that it has."""
+    """Return a command line with the answers to a question in place of those that it has.
+
+    A command that reads several files gets a line that keeps the answers next to the one that asks.
+    """
     end = words.index("--") if "--" in words else len(words)
-    answered, kept = {option_of(name) for name in question.missing}, list[str]()
-    for before, word in zip(("", *words), words[:end], strict=False):
-        if before not in answered and word.partition("=")[0] not in answered:
-            kept.append(word)
-    return " ".join(map(quoted, [*kept, *option_words(question.examples), *words[end:]]))
+    declared = _arguments_of(next((word for word in words[1:] if not word.startswith("-")), ""))
+    if "--read" not in {name for each in declared for name in each.names}:
+        answered, kept = {option_of(name) for name in question.missing}, list[str]()
+        for before, word in zip(("", *words), words[:end], strict=False):
+            if before not in answered and word.partition("=")[0] not in answered:
+                kept.append(word)
+        return " ".join(map(quoted, [*kept, *option_words(question.examples), *words[end:]]))
+    if any(each.field_info.kind is each.field_info.VAR_POSITIONAL for each in declared):
+        path = f"./{question.path}" if question.path.startswith("-") else question.path
+        return " ".join(map(quoted, ["springmass", "scene", path, *option_words(question.examples)]))
+    line, others, missing = list[str](), iter(words[:end]), set(question.missing)
+    for word in others:
+        name, _, value = word.partition("=")
+        pair = [word] if name == "--read" and value else [word, next(others, "")] if word == "--read" else []
+        if not pair:
+            line.append(word)
+        elif pair[-1].removeprefix("--read=").partition("=")[0].replace("-", "_") not in missing:
+            line += pair
+    return " ".join(map(quoted, [*line, *pair_words(question.examples), *words[end:]]))
+
+
+def _arguments_of(command: str) -> list[Argument]:
+    from springmass.commands import COMMANDS, app
+
+    return list(app[command].assemble_argument_collection()) if command in COMMANDS else []
 
 
 def for_course(question: Question) -> str:
     """Return how to answer a question about one recording of a course: in the table of runs, or for all recordings."""
-    columns = ", ".join(question.missing)
-    return f"fill in {columns} in the table of runs, or give batch {as_options(question.examples)} for all recordings"
+    columns, options = ", ".join(question.missing), " ".join(map(quoted, pair_words(question.examples)))
+    return f"fill in {columns} in the table of runs, or give batch {options} for all recordings"

@@ -12,7 +12,7 @@ from cyclopts import Parameter, Token
 
 from acquisition.clock import SystemClock, VirtualClock
 from acquisition.replay import Replay
-from springmass.commands.options import PART, ReadArguments, RecordingArgument, refuse
+from springmass.commands.options import ReadPairs, RecordingArgument
 from springmass.commands.parameters import Finite, flag, option
 from springmass.errors import OK
 from springmass.loading.load import load
@@ -38,11 +38,10 @@ def replay(
     ] = 1.0,
     seek: Annotated[Finite | None, option("S", "start at this second of the recording")] = None,
     loop: Annotated[bool, flag("start again at the end, until Ctrl-C")] = False,
-    read: ReadArguments = ReadArguments(),
+    reading: ReadPairs = ReadPairs(),
 ) -> int:
     """Play the input to stdout, one line per sample."""
-    refuse("replay", read, *PART)
-    loaded = load(recording, read)
+    loaded = load(recording, reading.options)
     fast = math.isinf(speed)
     clock, pace = (VirtualClock(), None) if fast else (SystemClock(), speed)
     begin_s = -math.inf if seek is None else seek

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import shlex
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 from acquisition.errors import visible
-from springmass.commands.options import FileArgument, converted
+from springmass.commands.options import FileArgument, ReadArguments, converted
 from springmass.commands.parameters import argument, option
 from springmass.errors import HINT, LOG, OK, ProgramError
+from springmass.loading.inputs import files_of
 
 SCENE_TEMPLATE = """\
 # What was at the bench. Remove the # before what you measured, and put your numbers for the dots.
@@ -60,11 +62,9 @@ def _mark(text: str) -> tuple[float, str]:
 
 
 def scene(
-    recording: Annotated[
-        FileArgument | None, argument("RECORDING", "save scene, remarks and marks next to this recording")
-    ] = None,
-    /,
-    *,
+    *recordings: Annotated[
+        FileArgument, argument("RECORDING", "save scene, remarks, marks and how it is read next to each, or a folder's")
+    ],
     check: Annotated[
         FileArgument | None, option("FILE", "show what a scene file states and which values are unusual")
     ] = None,
@@ -74,16 +74,21 @@ def scene(
         tuple[tuple[float, str], ...],
         converted("S=TEXT", "a mark S seconds into the recording; may be repeated", _mark),
     ] = (),
+    read: ReadArguments = ReadArguments(),
 ) -> int:
     """Print the template, check a scene, or note scene, remarks and marks beside a recording."""
     from pipeline.bench.scene import Scene
     from springmass.commands.questions import quoted
-    from springmass.loading.notes import about_of, write_about
+    from springmass.loading.load import load
+    from springmass.loading.notes import about_of, keep_answers, write_about
     from springmass.loading.scenes import ask_about, read_scene, stated_keys
 
-    noted = scene is not None or note or mark
+    given = read.about_the_file().given()
+    if read.unverified:
+        raise ProgramError("--unverified is for one command and not kept; leave it out")
+    noted = scene is not None or note or mark or given
     if check is not None:
-        if recording is not None or noted:
+        if recordings or noted:
             raise ProgramError("--check looks at a scene file alone; leave the rest out")
         checked = read_scene(check)
         ask_about(checked, check)
@@ -93,22 +98,33 @@ def scene(
             return OK
         LOG.log(HINT, f"springmass analyse RECORDING --scene {shlex.quote(str(check))}")
         return OK
-    if recording is None:
+    if not recordings:
         if noted:
-            raise ProgramError("--scene, --note and --mark belong to a recording; name it")
+            raise ProgramError("--scene, --note, --mark and options of reading belong to a recording; name it")
         print(SCENE_TEMPLATE, end="")
         LOG.log(HINT, "springmass scene > bench.toml, fill it in, springmass scene --check bench.toml")
         return OK
     if not noted:
-        demand = "nothing to save; give --scene, --note or --mark S=TEXT"
+        demand = "nothing to save; give --scene, --note, --mark S=TEXT or an option of reading"
         raise ProgramError(
-            f"{recording}: {demand}, or check a scene: springmass scene --check {quoted(str(recording))}"
+            f"{recordings[0]}: {demand}, or check a scene: springmass scene --check {quoted(str(recordings[0]))}"
         )
-    path = Path(recording)
-    if not path.is_file():
-        raise ProgramError(f"{path}: expected a recording, got none; check the name")
-    given = None if scene is None else read_scene(scene)
-    written = write_about(about_of(path).with_more(given, note, mark))
-    LOG.info(f"{written}: used from now on with {path.name}")
-    LOG.log(HINT, f"springmass analyse {shlex.quote(str(path))}")
+    files, messages = files_of([str(each) for each in recordings])
+    for line in messages:
+        LOG.info(line)
+    if missing := next((each.path for each in files if not Path(each.path).is_file()), None):
+        raise ProgramError(f"{missing}: expected a recording, got none; check the name")
+    stated = None if scene is None else read_scene(scene)
+    opened = []
+    for each in files if given else ():  # all are read before any notes are written
+        loaded = load(each.path, read if each.velocity is None else replace(read, velocity=each.velocity))
+        opened.append((Path(each.path), loaded.sha256))
+    for path, sha256 in opened:
+        keep_answers(path, given, sha256)
+    for path in (Path(each.path) for each in files):
+        about = about_of(path)
+        if stated is not None or note or mark:
+            write_about(about.with_more(stated, note, mark))
+        LOG.info(f"{about.path}: used from now on with {path.name}")
+    LOG.log(HINT, f"springmass analyse {' '.join(shlex.quote(str(each)) for each in recordings)}")
     return OK

@@ -15,7 +15,7 @@ from pipeline.dynamics.band import Band
 from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError
 from pipeline.results.effects import Effect, simulated_effects
-from springmass.commands.options import FiguresOption, FileArgument, Json, Overwrite, ReadArguments
+from springmass.commands.options import FiguresOption, FileArgument, Json, Overwrite, ReadPairs
 from springmass.commands.parameters import Finite, Positive, Whole, flag, option, output
 from springmass.errors import HINT, LOG, OK, ProgramError
 from springmass.loading.options import AnalysisOptions
@@ -67,7 +67,7 @@ def simulate(
     ] = None,
     figures: FiguresOption = (),
     as_json: Json = False,
-    read: ReadArguments = ReadArguments(),
+    reading: ReadPairs = ReadPairs(),
 ) -> int:
     """Print what the scene implies, its uncertainty and the cost; solve the equation and write the output."""
     if scene is None and against is None:
@@ -81,7 +81,7 @@ def simulate(
     if against is not None:
         from springmass.simulations.against import duration_s
 
-        run = Run.of(against, stated, AnalysisOptions.of(read.given()))
+        run = Run.of(against, stated, AnalysisOptions(**reading.options.given()))
         stated, analysis = run.scene, run.analysis
         longest_s = max(seconds or 0.0, duration_s(analysis))
         seconds = seconds or longest_s

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from pipeline.analysis import Oscillation
 from springmass import __version__
-from springmass.commands.options import AnalysisArguments, FileArgument, Json
+from springmass.commands.options import AnalysisArguments, FileArgument, Json, ReadPairs
 from springmass.commands.parameters import Positive, PositiveCount, argument, option
 from springmass.errors import OK, UNREADABLE, ProgramError
 from springmass.loading.scenes import read_scene
@@ -33,13 +33,14 @@ def trade(
     seeds: Annotated[PositiveCount, option("N", "simulated records of each kind (default: 20)")] = 20,
     seconds: Annotated[Positive, option("S", "length of the records without a recording, s (default: 60)")] = 60.0,
     as_json: Json = False,
+    reading: ReadPairs = ReadPairs(),
     how: AnalysisArguments = AnalysisArguments(),
 ) -> int:
     """Simulate records of one motion, evaluate them with every tier, and solve the motion with every integrator."""
     motion = TrueMotion(seconds=seconds)
     given_scene = None if scene is None else read_scene(scene)
     if recording is not None:
-        analysis = Run.of(recording, given_scene, how).analysis
+        analysis = Run.of(recording, given_scene, how.of(reading.options)).analysis
         analysis.track.demand_length("a simulation of the motion")
         if not isinstance(analysis.motion, Oscillation):
             raise ProgramError(f"{recording}: {analysis.motion.why}; name a run that oscillates", UNREADABLE)

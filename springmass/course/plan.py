@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.recordings.identify import dialect_folder
+from acquisition.recordings.reading import READ_FIELDS, Kind
 from acquisition.regular_file import open_regular, read_regular
 from pipeline.bench.scene import PLACES, Scene
 from pipeline.registry.laws import ANY_LAW, law_names
@@ -29,7 +30,7 @@ from springmass.course.results_csv import RESERVED
 from springmass.errors import UNREADABLE, ProgramError
 from springmass.layout import part
 from springmass.loading.inputs import InputFile, files_of
-from springmass.loading.notes import about_path
+from springmass.loading.notes import notes_paths
 from springmass.loading.options import ANALYSIS_DEFAULTS, AnalysisOptions
 from springmass.loading.scenes import read_scene
 from springmass.result.output_names import numbered
@@ -52,7 +53,7 @@ def digests_of(task: Task) -> dict[str, str]:
 
 def made_of(task: Task) -> str:
     """Return a digest of all on which the run's row and report depend; this reads the files."""
-    files = (task.source, task.how.velocity, about_path(Path(task.source)))
+    files = (task.source, task.how.velocity, *notes_paths(Path(task.source)))
     read = [digest_of(str(path)) if path else "" for path in files]
     return _digest([*read, digests_of(task), software()])
 
@@ -184,9 +185,9 @@ def _digest(value: object) -> str:
     return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
 
 
-NUMERIC_ANSWERS = ("rate_hz", "from_s", "to_s", "clock_ppm")
 LAW = "law"
-ANSWERS = ("velocity", "channel", "run", "unit", "time", "time_unit", "delimiter", "decimal", LAW, *NUMERIC_ANSWERS)
+OF_ANALYSIS = ("from_s", "to_s", "clock_ppm")
+ANSWERS = (*READ_FIELDS, LAW, *OF_ANALYSIS)
 POSITION = "sensor_position"
 _U = tuple(f"{name}_u" for name in PLACES)
 KNOWN = ("path", "scene", POSITION, *ANSWERS, *PLACES, *_U)
@@ -275,7 +276,8 @@ def _tags(path: Path, names: Sequence[str]) -> tuple[str, ...]:
 def _values(folder: Path, row: Row) -> Values:
     texts = row.cells
     values: dict[str, Any] = {name: text for name, text in texts.items() if name != "path" and name not in _U}
-    values |= {name: row.number(name) for name in NUMERIC_ANSWERS if name in texts}
+    numeric = [name for name, each in READ_FIELDS.items() if each.metadata["kind"] is Kind.POSITIVE]
+    values |= {name: row.number(name) for name in (*numeric, *OF_ANALYSIS) if name in texts}
     values |= {name: os.path.join(folder, texts[name]) for name in ("scene", "velocity") if name in texts}
     for name in PLACES:
         if name in texts:

@@ -19,20 +19,19 @@ from pipeline.track import F8, Track
 from springmass.loading.inputs import kind_of
 from springmass.loading.load import load
 from springmass.loading.loaded import Loaded
-from springmass.loading.options import ReadOptions
+from springmass.loading.options import AnalysisOptions, LoadOptions
 
 EXPECTED = "a path, a run, a pair (t, y), or a dataset, frame or mapping with time and distance was expected"
 ABOUT = "springmass"
 """The attribute of a dataset with everything but the samples."""
-_OF_RUNS = frozenset({"from_s", "to_s", "clock_ppm"})
 
 
-def loaded_of(source: Any, options: ReadOptions) -> Loaded:
+def loaded_of(source: Any, options: AnalysisOptions) -> Loaded:
     """Return arrays in any supported container as a loaded recording; see :func:`springmass.analyse`.
 
     A dataset of springmass, or one that xarray read from a run file, comes with all that the file states.
     """
-    _demand(options, {"unit", "time_unit", *_OF_RUNS}, type(source).__name__)
+    _demand(options, {"unit", "time_unit"}, type(source).__name__)
     t, y, flags = _columns(source)
     about: Mapping[str, Any] = getattr(source, "attrs", {})
     of_y: Mapping[str, Any] = getattr(y.values, "attrs", {})
@@ -54,13 +53,13 @@ def loaded_of(source: Any, options: ReadOptions) -> Loaded:
     return Loaded(Recording("", "", SourceInfo(*info), "", samples), "memory")
 
 
-def refuse_reading(options: ReadOptions) -> None:
+def refuse_reading(options: AnalysisOptions) -> None:
     """Refuse options of reading for a run that was read before, on which they would have no effect."""
-    _demand(options, _OF_RUNS, "run that is read already")
+    _demand(options, (), "run that is read already")
 
 
-def _demand(options: ReadOptions, allowed: Collection[str], what: str) -> None:
-    reading = {each.name for each in fields(ReadOptions)}
+def _demand(options: AnalysisOptions, allowed: Collection[str], what: str) -> None:
+    reading = {each.name for each in fields(LoadOptions)}
     if others := [name for name in options.given() if name in reading and name not in allowed]:
         raise TrackError(f"{', '.join(others)} complete recordings named by a path, got a {what}; leave that out")
 

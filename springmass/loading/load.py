@@ -17,18 +17,17 @@ from springmass.errors import LOG, UNREADABLE, ProgramError
 from springmass.layout import STDIN, part
 from springmass.loading.inputs import kind_of
 from springmass.loading.loaded import UNVERIFIED, Loaded, sha256_of
-from springmass.loading.notes import about_of
-from springmass.loading.options import READ_DEFAULTS, ReadOptions
+from springmass.loading.notes import about_of, answers_of
+from springmass.loading.options import LOAD_DEFAULTS, LoadOptions
 from storage.errors import RunDamaged
 from storage.recovery.recover import open_log, read_longest_part
 from storage.run_file.layout import CHECKED
 from storage.run_file.reading import open_run
 
 DIFFERENCES_NAMED = 5  # maximum number of differences that a message names
-_OF_FILES = frozenset({"velocity", "channel", "rate_hz", "unit", "run", "time", "time_unit", "delimiter", "decimal"})
 
 
-def load(path: str | Path, options: ReadOptions = READ_DEFAULTS, *, scene_given: bool = False) -> Loaded:
+def load(path: str | Path, options: LoadOptions = LOAD_DEFAULTS, *, scene_given: bool = False) -> Loaded:
     """Read a recording, a run file or a wire log, or standard input.
 
     All digests of a run file are checked before any sample is used. With ``scene_given`` the caller uses another scene,
@@ -37,7 +36,14 @@ def load(path: str | Path, options: ReadOptions = READ_DEFAULTS, *, scene_given:
     if str(path) == STDIN:
         return _load_stdin(options)
     where = Path(path)
-    kind = kind_of(where)
+    kind, kept = kind_of(where), answers_of(where)
+    from_notes = kept.beside(options.about_the_file().given())
+    options = replace(options, **from_notes)
+    about = about_of(where)
+    noted = [f"{name} {value}" for name, value in from_notes.items()]
+    noted += filter(None, [about.described(scene=not scene_given)])
+    if from_notes:  # said first, because they may be the reason why the file cannot be read
+        LOG.info(f"{kept.path}: {', '.join(noted)} read from the notes next to the file")
     if kind == "run":
         _refuse(where, "a run file", options, ())
         loaded = _load_run(where, unverified=options.unverified)
@@ -45,8 +51,7 @@ def load(path: str | Path, options: ReadOptions = READ_DEFAULTS, *, scene_given:
         _refuse(where, "a wire log", options, ("channel",))
         loaded = _load_wire(where, options.channel)
     else:
-        answers = {name: getattr(options, name) for name in _OF_FILES - {"velocity"}}
-        recording = open_recording(where, velocity_path=options.velocity, **answers)
+        recording = open_recording(where, options.about_the_file())
         origin = {"start_time": recording.start_time, "recorded_run": recording.run}
         provenance = {name: value for name, value in origin.items() if value}
         sha256 = recording.originals[0].sha256
@@ -54,22 +59,23 @@ def load(path: str | Path, options: ReadOptions = READ_DEFAULTS, *, scene_given:
     for trap in loaded.traps:
         if trap.code == UNVERIFIED:
             LOG.warning(f"{where}: {trap.message}")
-    about = about_of(where)
-    if described := about.described(scene=not scene_given):
-        LOG.info(f"{about.path}: {described} read from the notes next to the file")
+    if from_notes and kept.sha256 not in ("", loaded.sha256):
+        LOG.warning(f"{kept.path}: {where.name} has changed since it was stated how to read it; check [reading]")
+    if noted and not from_notes:
+        LOG.info(f"{about.path}: {', '.join(noted)} read from the notes next to the file")
     if about.described():
         scene = loaded.scene if about.scene is None else about.scene.to_mapping()
         marks = [*loaded.provenance.get("marks", ()), *({"t_s": t_s, "text": text} for t_s, text in about.marks)]
-        noted = {"marks": marks} if marks else {}
+        added = {"marks": marks} if marks else {}
         if about.notes:
-            noted["notes"] = list(about.notes)
-        loaded = replace(loaded, scene=scene, provenance={**loaded.provenance, **noted})
+            added["notes"] = list(about.notes)
+        loaded = replace(loaded, scene=scene, provenance={**loaded.provenance, **added})
     summary = f"{loaded.format}, {len(loaded.samples)} samples of {loaded.samples.quantity}"
     LOG.debug(f"read: {where}: {summary} at {loaded.info.rate_hz:g} Hz, clock: {loaded.info.clock}")
-    return loaded.within(options)
+    return replace(loaded, reading=options.about_the_file().given())
 
 
-def _load_stdin(options: ReadOptions) -> Loaded:
+def _load_stdin(options: LoadOptions) -> Loaded:
     """Load from standard input by way of a temporary file, because the formats need a seekable file."""
     with tempfile.TemporaryDirectory(prefix="springmass-") as folder:
         spooled = Path(folder) / "stdin"
@@ -96,9 +102,9 @@ def sample_data() -> Path:
     raise ProgramError(f"{folder}: the bundled recordings are missing; install springmass again", UNREADABLE)
 
 
-def _refuse(path: Path, what: str, options: ReadOptions, allowed: Sequence[str]) -> None:
+def _refuse(path: Path, what: str, options: LoadOptions, allowed: Sequence[str]) -> None:
     """Refuse options that describe a file which already states everything itself."""
-    given = [name for name in options.given() if name in _OF_FILES and name not in allowed]
+    given = [name for name in options.about_the_file().given() if name not in allowed]
     if given:
         raise ProgramError(f"{path}: {what} states everything, got {', '.join(given)} too; leave that out")
 

@@ -17,7 +17,7 @@ from acquisition.recordings.recording import FormatIssue, Original, Recording
 from acquisition.regular_file import open_regular
 from pipeline.track import Track
 from springmass.errors import UNREADABLE, ProgramError
-from springmass.loading.options import ReadOptions
+from springmass.loading.options import AnalysisOptions
 from springmass.loading.track import between, to_track
 from storage.run_file.reading import open_run
 
@@ -31,8 +31,9 @@ class Loaded:
     ``format`` is the family that read it, "run" for a run file, "wire" for a wire log, "memory" for arrays; the format
     of the recording is the family of what is inside a run file. ``scene`` comes from the notes next to the file, or
     else from inside a run file. ``sha256`` is the digest of the file's bytes, empty for arrays and for an empty wire
-    log. With ``originals_inside`` the original files are inside the run file, and are read when they are needed. The
-    track has the samples from ``from_s`` to ``to_s``; ``clock_ppm`` is the stated rate error of the sensor's clock.
+    log. With ``originals_inside`` the original files are inside the run file, and are read when they are needed.
+    ``reading`` are the options with which the file was read, by name. The track has the samples from ``from_s`` to
+    ``to_s``; ``clock_ppm`` is the stated rate error of the sensor's clock.
     """
 
     recording: Recording
@@ -41,6 +42,7 @@ class Loaded:
     provenance: Mapping[str, Any] = field(default_factory=dict)
     sha256: str = ""
     originals_inside: bool = False
+    reading: Mapping[str, Any] = field(default_factory=dict)
     from_s: float = -math.inf
     to_s: float = math.inf
     clock_ppm: float | None = None
@@ -98,7 +100,7 @@ class Loaded:
         with open_run(self.path, unverified=any(trap.code == UNVERIFIED for trap in self.traps)) as run:
             return run.originals()
 
-    def within(self, options: ReadOptions) -> Loaded:
+    def within(self, options: AnalysisOptions) -> Loaded:
         """Return the input with the chosen seconds of its track, and with the stated error of its clock."""
         low = -math.inf if options.from_s is None else options.from_s
         high = math.inf if options.to_s is None else options.to_s

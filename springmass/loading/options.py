@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from pathlib import Path
 from types import EllipsisType
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
+from acquisition.recordings.reading import ReadOptions
 from pipeline.damping.laws import LAWS, Law, find_law
 from pipeline.errors import AnalysisError
 from pipeline.options import Options, options_for
@@ -17,51 +17,28 @@ Accuracy = Literal["fast", "standard", "best"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class ReadOptions:
-    """What the user states about a recording beyond its name: what the file leaves out or open, and the part to use.
+class LoadOptions(ReadOptions):
+    """The options of reading, and whether a run file is read despite a checksum mismatch, which no notes can state."""
 
-    ``springmass.commands.options`` says for each of them what the command line calls it and what its help says.
-    """
-
-    velocity: str | Path | None = None
-    channel: str | None = None
-    run: str | None = None
-    rate_hz: float | None = None
-    unit: str | None = None
-    time: str | None = None
-    time_unit: str | None = None
-    delimiter: str | None = None
-    decimal: str | None = None
     unverified: bool = False
-    from_s: float | None = None
-    to_s: float | None = None
-    clock_ppm: float | None = None
-
-    def given(self) -> dict[str, Any]:
-        """Return the values of all options that are not the default, by name."""
-        return {each.name: value for each in fields(self) if (value := getattr(self, each.name)) != each.default}
-
-    @classmethod
-    def of(cls, answers: Mapping[str, Any]) -> Self:
-        """Return the options given as keyword arguments."""
-        names = [each.name for each in fields(cls)]
-        if unknown := [name for name in answers if name not in names]:
-            raise TypeError(f"{unknown[0]!r} is no option of reading; the options are {', '.join(names)}")
-        return cls(**answers)
 
 
-READ_DEFAULTS = ReadOptions()
-"""No option given: only the file's own statements are used."""
+LOAD_DEFAULTS = LoadOptions()
+"""No option given: only the file's own statements, and the notes next to it, are used."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class AnalysisOptions(ReadOptions):
-    """The options of reading, and those of the analysis: its accuracy, and what is known about the damping law.
+class AnalysisOptions(LoadOptions):
+    """The options of reading, and those of the analysis: its part of the recording, its accuracy, the damping law.
 
+    ``clock_ppm`` is the largest rate error of the sensor's clock.
     ``law`` is the law that the results follow, "any" to let the recording choose whatever the scene states; ``laws``
     are those to try. With ``method`` "classic" the lab report's own method is applied as well.
     """
 
+    from_s: float | None = None
+    to_s: float | None = None
+    clock_ppm: float | None = None
     accuracy: Accuracy = "standard"
     law: str | None = None
     laws: Sequence[str | Law | EllipsisType] | None = None

@@ -24,6 +24,14 @@ def now_utc() -> str:
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
+def _answers(loaded: Loaded) -> dict[str, Any]:
+    """Return what was stated about the file, with the name of a velocity file, whose bytes travel inside."""
+    stated = dict(loaded.reading)
+    if "velocity" in stated:
+        stated["velocity"] = Path(stated["velocity"]).name
+    return {"reading": stated} if stated else {}
+
+
 def save_run(
     path: str | os.PathLike[str],
     loaded: Loaded,
@@ -44,6 +52,6 @@ def save_run(
         traps=loaded.traps,
         malformed_rows=loaded.recording.malformed_rows,
         format=loaded.recording.format,
-        provenance={**loaded.provenance, **made_now()},
+        provenance={**loaded.provenance, **_answers(loaded), **made_now()},
         overwrite=overwrite,
     )

@@ -80,7 +80,8 @@ class Run(Mapping[str, Value]):
     def of(cls, source: Any, scene: Any = None, how: AnalysisOptions = ANALYSIS_DEFAULTS, name: str = "") -> Run:
         """Return the run of a path, arrays, or another run; ``scene`` is one, its tables, or the path of its file."""
         if isinstance(source, str | os.PathLike):
-            loaded = load(Path(source), how, scene_given=scene is not None)
+            loaded = load(Path(source), how, scene_given=scene is not None).within(how)
+            how = replace(how, **loaded.reading)
         elif isinstance(source, Run):
             refuse_reading(how)
             loaded = source.loaded.within(how)

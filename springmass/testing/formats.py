@@ -12,6 +12,7 @@ import numpy as np
 from acquisition.block import Flag
 from acquisition.errors import FormatError
 from acquisition.recordings.identify import formats
+from acquisition.recordings.reading import ReadOptions
 from acquisition.recordings.recording import Format, Recording
 from acquisition.recordings.tables.text import HEAD_BYTES
 from pipeline.track import F8
@@ -32,7 +33,7 @@ class File:
     write : callable
         Takes times (n,) in s and distances (n,) in m, NaN where there is none, and returns the bytes of a file.
     answers : mapping
-        What the file leaves open: ``channel``, ``unit``, ``run``, ... of :meth:`springmass.extend.Format.read`.
+        What the file leaves open, by name: the fields of :class:`springmass.extend.ReadOptions`.
     quantum_m : float or None
         Step of the distances that the reader reports, m; None: not checked.
     offset_known : bool
@@ -57,7 +58,7 @@ class Case:
 
     def read(self, data: bytes, **answers: Any) -> Recording:
         """Read bytes, with the answers of the file."""
-        return self.format.read("run.dat", data, **{**self.file.answers, **answers})
+        return self.format.read("run.dat", data, ReadOptions.of({**self.file.answers, **answers}))
 
     def written(self, t: F8 = EXAMPLE_TIMES_S, x: F8 = DISTANCE) -> Recording:
         """Read a file of these times and distances."""

@@ -55,6 +55,44 @@ def test_the_line_that_is_suggested_does_what_was_asked(cli: Cli, table: Path, t
     assert cli(*suggested, *unit).code == 0
 
 
+PAIRS = {
+    "replay": ["replay", "FILE", "--speed", "max"],
+    "replay a channel that is not there": [
+        "replay",
+        "--read",
+        "channel=z",
+        "--read",
+        "unit=cm",
+        "FILE",
+        "--speed",
+        "max",
+    ],
+    "simulate": ["simulate", "--against", "FILE", "--scene", SCENE, "--json"],
+    "trade": ["trade", "FILE", "--seeds", "1", "--json"],
+}
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_the_line_with_pairs_that_is_suggested_works(cli: Cli, table: Path, name: str) -> None:
+    """What is missing is stated as --read KEY=VALUE."""
+    done = cli(*(str(table) if word == "FILE" else word for word in PAIRS[name]))
+    assert (done.code, done.out) == (3, "")
+    _, *suggested = shlex.split(done.complaint[done.complaint.index("? springmass ") + 2 :])
+    assert "channel=z" not in suggested
+    assert "channel=height of bob" in suggested
+    assert cli(*suggested).code == 0
+
+
+def test_several_files_are_asked_for_notes(cli: Cli, table: Path) -> None:
+    """The suggested line keeps the answers next to the file that asks; then the same command works."""
+    typed = ("compare", table, sample_data() / "damped_simulated_position.txt", "--scene", SCENE, "--json")
+    done = cli(*typed)
+    assert done.code == 3
+    _, *suggested = shlex.split(done.complaint[done.complaint.index("? springmass ") + 2 :])
+    assert cli(*suggested).code == 0
+    assert cli(*typed).code == 0
+
+
 def test_each_of_several_inputs_is_asked_for_alone(cli: Cli, table: Path) -> None:
     """An answer for one file may be wrong for another: the line names the one that asks."""
     done = cli("analyse", table, sample_data() / "damped_simulated_position.txt", "--json", "--unit", "cm")

@@ -15,6 +15,7 @@ import pytest
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.identify import open_recording
 from acquisition.recordings.questions import Missing
+from acquisition.recordings.reading import ReadOptions
 from acquisition.recordings.recording import Recording
 from tests.sampling import sampled
 
@@ -127,7 +128,7 @@ def judge(path: Path, table: Written) -> str:
     answers: dict[str, str] = {}
     for _ in range(2):
         try:
-            recording = open_recording(path, **answers)  # type: ignore[arg-type]
+            recording = open_recording(path, ReadOptions.of(answers))
         except NeedsAnswer as error:
             words = str(error)
             if "\n" in words or answers:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from acquisition.errors import FormatError
 from acquisition.recordings.identify import formats, get_format
+from acquisition.recordings.reading import ReadOptions
 from acquisition.recordings.recording import Recording
 from tests.conformance.test_formats import CASES
 
@@ -25,7 +26,7 @@ SEEDS = [(case, case.build(SHORT, np.round(0.2 + 0.05 * np.sin(7.9 * SHORT), 5))
 def read(name: str, data: bytes, options: dict[str, Any]) -> Recording | str:
     """Return the recording, or the message of the refusal."""
     try:
-        return get_format(name).read("run.dat", data, **options)
+        return get_format(name).read("run.dat", data, ReadOptions.of(options))
     except FormatError as error:
         return str(error)
 

@@ -14,6 +14,7 @@ import pytest
 
 from acquisition.block import Flag
 from acquisition.recordings.identify import open_recording
+from acquisition.recordings.reading import ReadOptions
 from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.track import UNITS, Track
 from tests.sampling import sampled
@@ -105,7 +106,9 @@ def test_the_unit_that_is_answered_changes_no_time_and_no_flag(tmp_path: Path, s
         y[300:330] = 60.0 * size
     path = tmp_path / "run.csv"
     path.write_text("t,y\n" + "\n".join(f"{a:.2f},{b:.6g}" for a, b in zip(t, y, strict=True)), encoding="utf-8")
-    found = {unit: open_recording(path, unit=unit, time_unit="s").samples for unit in ("m", "cm", "mm", "um")}
+    found = {
+        unit: open_recording(path, ReadOptions(unit=unit, time_unit="s")).samples for unit in ("m", "cm", "mm", "um")
+    }
     for unit, factor in (("cm", 1e-2), ("mm", 1e-3), ("um", 1e-6)):
         np.testing.assert_array_equal(found[unit].t, found["m"].t)
         np.testing.assert_array_equal(found[unit].flags, found["m"].flags)

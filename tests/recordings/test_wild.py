@@ -11,6 +11,7 @@ import pytest
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.identify import open_recording
 from acquisition.recordings.questions import Missing
+from acquisition.recordings.reading import ReadOptions
 from pipeline.analyse import Analysis, analyse
 from pipeline.track import UNUSABLE
 from springmass.loading.track import to_track
@@ -59,13 +60,13 @@ def test_a_workbook_of_results_is_no_recording(recordings: Path) -> None:
     with pytest.raises(FormatError, match="not a recording"):
         open_recording(only(recordings, "xlsx"))
     with pytest.raises(NeedsAnswer) as caught:
-        open_recording(only(recordings, "xlsx"), rate_hz=1.0)
+        open_recording(only(recordings, "xlsx"), ReadOptions(rate_hz=1.0))
     assert caught.value.question.missing == (Missing.CHANNEL, Missing.UNIT)
 
 
 def analysed(path: Path, given: Given) -> tuple[Analysis, np.ndarray, np.ndarray]:
     """Return the analysis, and the times and values that it used."""
-    recording = open_recording(path, **given)
+    recording = open_recording(path, ReadOptions.of(given))
     found = analyse(to_track(recording.samples, recording.info))
     used = (found.flags & UNUSABLE) == 0
     return found, recording.samples.t[used], recording.samples.distance[used]

@@ -15,18 +15,17 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from acquisition.block import B1, F8, I8, Block, Flag
 from acquisition.errors import FormatError, NeedsAnswer
+from acquisition.recordings.reading import READ_DEFAULTS, ReadOptions
 from acquisition.recordings.recording import FormatIssue, Original, Recording, Survey
 from acquisition.recordings.sampling.flags import IRREGULAR, UNREAD_FLAGS, time_flags
 from acquisition.recordings.sampling.timing import median
 from acquisition.recordings.tables.cells import EMPTY_CELL, UNREAD_CELL, scaled
 from acquisition.recordings.tables.channel import check_values, read_channel
-from acquisition.recordings.tables.choose import Answers
 from acquisition.recordings.tables.format import ColumnFormat, text_format
 from acquisition.recordings.tables.headings import Heading
 from acquisition.recordings.tables.layout import columns_of, find_table, runs_forward
@@ -109,24 +108,24 @@ class MotionSensor(ColumnFormat):
     def survey(self, path: str, data: bytes) -> tuple[Survey, ...]:
         """Return the only channel of a file; an empty tuple if the user must state the rate."""
         try:
-            samples = self._samples(path, data, Answers())
+            samples = self._samples(path, data, READ_DEFAULTS)
         except NeedsAnswer:
             return ()
         column, rate_hz = samples.column, samples.timing.rate_hz
         return (Survey("", column.name, column.unit, samples.t.size, rate_hz, samples.traps),)
 
-    def read(self, path: str, data: bytes, **answers: Any) -> Recording:
+    def read(self, path: str, data: bytes, reading: ReadOptions = READ_DEFAULTS) -> Recording:
         """Read one file, either of position or of velocity; see :class:`springmass.extend.Format`."""
-        samples = self._samples(path, data, Answers(**answers))
+        samples = self._samples(path, data, reading)
         if samples.column.name == "velocity":
             return samples.recording(self.name, data, *_summed_up(samples))
         return samples.recording(self.name, data, Block(0, samples.t, samples.value, samples.flags))
 
     def read_pair(
-        self, position: tuple[str, bytes], velocity: tuple[str, bytes], *, rate_hz: float | None = None
+        self, position: tuple[str, bytes], velocity: tuple[str, bytes], reading: ReadOptions = READ_DEFAULTS
     ) -> Recording:
         """Join a position file and a velocity file by time; they may be given in either order."""
-        files = [(self._samples(*each, Answers(rate_hz=rate_hz)), each[1]) for each in (position, velocity)]
+        files = [(self._samples(*each, reading), each[1]) for each in (position, velocity)]
         (p, position_data), (v, velocity_data) = sorted(files, key=lambda file: file[0].column.name)
         if p.column.name == v.column.name:
             problem = f"expected a position and a velocity file, got {p.column.name} in both ({p.name} too)"
@@ -135,7 +134,7 @@ class MotionSensor(ColumnFormat):
         unread = joined.malformed_rows + int(np.count_nonzero(~v.sound))
         return replace(joined, malformed_rows=unread, originals=(*joined.originals, Original(v.name, velocity_data)))
 
-    def _samples(self, path: str, data: bytes, answers: Answers) -> Samples:
+    def _samples(self, path: str, data: bytes, answers: ReadOptions) -> Samples:
         """Read the samples of a file, m or m/s, with the error that it states."""
         tables = self.tables(path, data)
         velocity = tables[0].columns[0].name == "velocity"

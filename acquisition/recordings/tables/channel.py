@@ -10,6 +10,7 @@ import numpy as np
 
 from acquisition.block import F8, I8, Flag
 from acquisition.errors import FormatError
+from acquisition.recordings.reading import ReadOptions
 from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.sampling.flags import (
     UNREAD_FLAGS,
@@ -22,7 +23,7 @@ from acquisition.recordings.sampling.flags import (
 )
 from acquisition.recordings.sampling.timing import ChannelRows, find_timing
 from acquisition.recordings.tables.cells import EMPTY_CELL, I1, UNREAD_CELL, scaled, usual_decimals
-from acquisition.recordings.tables.choose import Answers, choose_channel, measure
+from acquisition.recordings.tables.choose import choose_channel, measure
 from acquisition.recordings.tables.samples import Samples
 from acquisition.recordings.tables.table import Column, Lines, Table, names_apart
 from acquisition.units import TIMES, Measure, time_unit
@@ -32,7 +33,7 @@ _LONGEST_S = 1e10
 _HOUR_S, _DAY_S, _MOST_JUMPS, _SLOWEST_HZ = 3600.0, 86400.0, 10, 0.01
 
 
-def read_channel(path: str, tables: Sequence[Table], answers: Answers, difference: bool = False) -> Samples:
+def read_channel(path: str, tables: Sequence[Table], answers: ReadOptions, difference: bool = False) -> Samples:
     """Choose a channel and read its samples.
 
     ``difference`` says that each value is the difference from the row before, so that the first may be absent.

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from acquisition.block import F8
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.questions import Missing, MissingItem, Question
+from acquisition.recordings.reading import READ_DEFAULTS, ReadOptions
 from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.sampling.timing import median, rate_needed
 from acquisition.recordings.tables.headings import BRACKETED, name_and_unit
@@ -49,21 +50,9 @@ _LIKELY = (
 Channel = tuple[Table, Column]
 
 
-@dataclass(frozen=True, slots=True)
-class Answers:
-    """The user's statements about a file; None for each item that is not stated."""
-
-    channel: str | None = None
-    rate_hz: float | None = None
-    unit: str | None = None
-    run: str | None = None
-    time: str | None = None
-    time_unit: str | None = None
-
-
-def choose_channel(path: str, tables: Sequence[Table], answers: Answers) -> Channel:
+def choose_channel(path: str, tables: Sequence[Table], answers: ReadOptions) -> Channel:
     """Return the channel to read, in a table with its times, or ask for everything that is missing in one question."""
-    if answers == Answers() and not any(_may_be_a_recording(table) for table in tables):
+    if answers == READ_DEFAULTS and not any(_may_be_a_recording(table) for table in tables):
         raise _no_recording(path, tables[0])
     needs: list[MissingItem] = []
     runs = tuple(dict.fromkeys(table.run for table in tables))
@@ -243,7 +232,7 @@ def _with_time_unit(path: str, table: Table, unit: str) -> Table:
     return replace(table, times=replace(table.times, unit=unit))
 
 
-def _missing_times(columns: Sequence[Column], table: Table, column: Column, answers: Answers) -> list[MissingItem]:
+def _missing_times(columns: Sequence[Column], table: Table, column: Column, answers: ReadOptions) -> list[MissingItem]:
     if not table.is_timed:
         if answers.rate_hz is not None:
             return []

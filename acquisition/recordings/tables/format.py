@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import islice
-from typing import Any
 
 from acquisition.block import Block
 from acquisition.errors import FormatError, NeedsAnswer
+from acquisition.recordings.reading import READ_DEFAULTS, ReadOptions
 from acquisition.recordings.recording import FormatIssue, Recording, Survey
 from acquisition.recordings.tables.channel import check_values, read_channel, read_samples, rows_of
-from acquisition.recordings.tables.choose import Answers
 from acquisition.recordings.tables.rows import read_rows
 from acquisition.recordings.tables.table import Column, Header, Table, TableFacts, names_apart, set_back, side_by_side
 from acquisition.recordings.tables.text import Text, head_lines, text_of
@@ -48,9 +47,9 @@ class ColumnFormat:
     def _runs(self, path: str, data: bytes) -> list[Table]:
         return [part for table in self.tables(path, data) for part in set_back(table)]
 
-    def read(self, path: str, data: bytes, **answers: Any) -> Recording:
+    def read(self, path: str, data: bytes, reading: ReadOptions = READ_DEFAULTS) -> Recording:
         """Read one channel of one run; see :class:`springmass.extend.Format`."""
-        samples = read_channel(path, self._runs(path, data), Answers(**answers))
+        samples = read_channel(path, self._runs(path, data), reading)
         length = samples.measured.quantity == "length" and (samples.column.is_length or not samples.column.unit)
         samples, measured = check_values(samples, length=length), samples.measured
         block = Block(0, samples.t, samples.value, samples.flags, quantity=measured.quantity, unit=measured.si)

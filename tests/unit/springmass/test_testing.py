@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from acquisition.recordings.reading import ReadOptions
 from springmass import extend
 from springmass.extend import FramedDecoder, LineSplitter, OneStep, Reading, Sensor, acceleration, make_law
 from springmass.testing import File, check
@@ -74,9 +75,9 @@ class InCentimetres:
         """Take any text."""
         return head.isascii()
 
-    def read(self, path: str, data: bytes, **answers: Any) -> Any:
+    def read(self, path: str, data: bytes, reading: ReadOptions) -> Any:
         """Return ten times the distances."""
-        found = right.HEIGHT_LOG.read(path, data, **answers)
+        found = right.HEIGHT_LOG.read(path, data, reading)
         return replace(found, samples=replace(found.samples, distance=10 * found.samples.distance), originals=())
 
 

@@ -13,6 +13,7 @@ import pytest
 from acquisition.errors import NeedsAnswer
 from acquisition.recordings.identify import open_recording
 from acquisition.recordings.questions import Missing
+from acquisition.recordings.reading import ReadOptions
 
 N = 60
 T = np.arange(N) / 20
@@ -189,7 +190,7 @@ def test_a_program_is_read_by_what_it_writes(tmp_path: Path, name: str) -> None:
         assert set(caught.value.question.missing) == set(answers)
         if "rate_hz" in answers:
             answers["rate_hz"] = float(output["--rate-hz"])
-    recording = open_recording(path, **answers)  # type: ignore[arg-type]
+    recording = open_recording(path, ReadOptions.of(answers))
     samples = recording.samples
     assert (recording.channel, len(samples), recording.malformed_rows) == (channel, N, 0)
     np.testing.assert_allclose(samples.t - samples.t[0], T, atol=2e-5)
@@ -229,7 +230,7 @@ def test_a_dialect_opens_with_what_it_says(tmp_path: Path, name: str) -> None:
     text, answers = DIALECTS[name]
     path = tmp_path / "run.txt"
     path.write_text(text + "\n", encoding="utf-8")
-    recording = open_recording(path, **answers)  # type: ignore[arg-type]
+    recording = open_recording(path, ReadOptions.of(answers))
     samples = recording.samples
     np.testing.assert_allclose(samples.t - samples.t[0], T, atol=1e-9)
     np.testing.assert_allclose(samples.distance, X, atol=1e-9)

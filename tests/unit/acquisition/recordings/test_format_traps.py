@@ -12,6 +12,7 @@ import pytest
 from acquisition.block import F8
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.identify import get_format, open_recording
+from acquisition.recordings.reading import ReadOptions
 from acquisition.recordings.recording import Recording
 from tests.sampling import sampled
 
@@ -27,7 +28,7 @@ def segment(names: str, *facts: str, channels: int = 1) -> list[str]:
 def lvm(*lines: str, mark: str = "\t", encoding: str = "utf-8", **options: str) -> Recording:
     """Read an LVM file of these lines; a unit is said unless told otherwise."""
     data = "\r\n".join(lines).replace("\t", mark).encode(encoding)
-    return get_format("lvm").read("run.lvm", data, **{"unit": "m", **options})
+    return get_format("lvm").read("run.lvm", data, ReadOptions.of({"unit": "m", **options}))
 
 
 def codes(recording: Recording) -> set[str]:
@@ -155,7 +156,7 @@ def test_bursts_with_missing_samples_are_asked_about(tmp_path: Path) -> None:
     path = written(tmp_path, t, 6)
     with pytest.raises(NeedsAnswer):
         open_recording(path)
-    assert open_recording(path, rate_hz=100.0).info.rate_hz == 100.0
+    assert open_recording(path, ReadOptions(rate_hz=100.0)).info.rate_hz == 100.0
 
 
 @pytest.mark.parametrize(
@@ -188,7 +189,7 @@ def test_marks_of_thousands_are_refused(tmp_path: Path, group: str, point: str, 
     rows = (f"{t};{_printed(x, group, point)}\n" for t, x in zip(times, _VALUES, strict=True))
     path.write_text(heading + "".join(rows), encoding="utf-8")
     with pytest.raises(FormatError):
-        open_recording(path, unit=None if "(" in heading else "mm")
+        open_recording(path, ReadOptions(unit=None if "(" in heading else "mm"))
 
 
 def test_thousands_in_quotes_are_refused_next_to_separating_commas(tmp_path: Path) -> None:
@@ -203,6 +204,6 @@ def test_a_comma_that_may_be_either_in_all_numbers_is_decimal_and_reported(tmp_p
     """Where semicolons separate and no other mark stands in the file."""
     path = tmp_path / "run.csv"
     path.write_text("".join(f"{i};1,{501 + i}\n" for i in range(40)), encoding="utf-8")
-    recording = open_recording(path, unit="m", rate_hz=20.0)
+    recording = open_recording(path, ReadOptions(unit="m", rate_hz=20.0))
     np.testing.assert_allclose(recording.samples.distance, 1.501 + 1e-3 * np.arange(40))
     assert "decimal_comma" in {trap.code for trap in recording.traps}

@@ -8,6 +8,7 @@ import pytest
 from acquisition.block import Flag
 from acquisition.errors import FormatError
 from acquisition.recordings.families.motion_sensor import FORMAT
+from acquisition.recordings.reading import ReadOptions
 from acquisition.recordings.recording import Recording
 from tests.sampling import sampled
 
@@ -23,7 +24,7 @@ def position_rows(count: int = 12, rate: float = 100.0, start: int = 0) -> list[
 
 def read(*lines: str, newline: str = "\n", **options: object) -> Recording:
     """Read a file of these lines, without newline after the last."""
-    return FORMAT.read("run.txt", newline.join(lines).encode(), **options)  # type: ignore[arg-type]
+    return FORMAT.read("run.txt", newline.join(lines).encode(), ReadOptions.of(options))
 
 
 def codes(recording: Recording) -> set[str]:

@@ -11,6 +11,7 @@ import pytest
 from acquisition.errors import NeedsAnswer
 from acquisition.recordings.identify import open_recording
 from acquisition.recordings.questions import Missing
+from acquisition.recordings.reading import ReadOptions
 from acquisition.recordings.recording import Recording
 
 T = [i / 20 for i in range(60)]
@@ -32,7 +33,7 @@ FILES = {
 def walk(path: Path, answers: dict[str, Any]) -> Iterator[Recording]:
     """Answer one question after the other, with all runs and channels that are listed; yield what is read."""
     try:
-        recording = open_recording(path, **answers)
+        recording = open_recording(path, ReadOptions.of(answers))
     except NeedsAnswer as error:
         need = error.question.needs[0]
         if need.what.value in answers or (need.choices and need.example not in need.choices):
@@ -56,4 +57,10 @@ def test_every_choice_of_a_question_can_be_taken(tmp_path: Path, name: str) -> N
     choices = len(first.choices) if first.what in (Missing.RUN, Missing.CHANNEL) else 1
     assert len(recordings) >= choices
     assert len({each.samples.distance.tobytes() for each in recordings}) == len(recordings)
-    assert len(open_recording(path, **caught.value.question.examples).samples) == 60
+    assert len(open_recording(path, ReadOptions.of(caught.value.question.examples)).samples) == 60
+
+
+@pytest.mark.parametrize("kind", Missing)
+def test_every_question_is_answered_by_an_option(kind: Missing) -> None:
+    """A reader asks for nothing that the options of reading cannot state."""
+    assert ReadOptions.of({kind.value: "x"}).given() == {kind.value: "x"}

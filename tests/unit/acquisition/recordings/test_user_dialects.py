@@ -9,6 +9,7 @@ import pytest
 
 from acquisition.errors import AcquisitionError, UnknownFormat
 from acquisition.recordings.identify import dialect_folder, formats, get_format, open_recording
+from acquisition.recordings.reading import ReadOptions
 
 LOG = """
 title = "height log of bench 12"
@@ -53,7 +54,7 @@ def test_a_declared_dialect_is_a_family(declare: Callable[[str, str], Path], tmp
     recording = open_recording(tmp_path / "run.txt")
     assert (recording.format, recording.channel, recording.info.rate_hz) == ("height-log", "height", 50.0)
     assert recording.samples.distance[:2].tolist() == [0.2005, 0.2015]
-    assert open_recording(tmp_path / "run.txt", channel="n", unit="mm").samples.distance[3] == 0.003
+    assert open_recording(tmp_path / "run.txt", ReadOptions(channel="n", unit="mm")).samples.distance[3] == 0.003
 
 
 @pytest.mark.parametrize(

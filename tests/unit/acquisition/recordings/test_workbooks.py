@@ -10,6 +10,7 @@ import pytest
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.identify import get_format
 from acquisition.recordings.questions import Missing
+from acquisition.recordings.reading import ReadOptions
 from tests.conformance.test_formats import cells, packed, workbook
 
 WORKBOOK, ZIP = get_format("workbook"), get_format("zip")
@@ -51,7 +52,7 @@ def test_several_sheets_are_runs_of_which_one_is_named() -> None:
         WORKBOOK.read("run.xlsx", data)
     assert caught.value.question.missing == (Missing.RUN, Missing.UNIT)
     assert caught.value.question.needs[0].choices == ("first", "second")
-    recording = WORKBOOK.read("run.xlsx", data, run="second", unit="m")
+    recording = WORKBOOK.read("run.xlsx", data, ReadOptions(run="second", unit="m"))
     assert recording.run == "second"
 
 
@@ -70,7 +71,7 @@ def test_an_archive_of_several_runs_asks_which() -> None:
     with pytest.raises(NeedsAnswer) as caught:
         ZIP.read("run.zip", data)
     assert caught.value.question.needs[0].choices == ("a.csv", "b.txt")
-    recording = ZIP.read("run.zip", data, run="b.txt")
+    recording = ZIP.read("run.zip", data, ReadOptions(run="b.txt"))
     assert recording.samples.distance.tolist() == [0.1, 0.2, 0.4, 0.1]
 
 

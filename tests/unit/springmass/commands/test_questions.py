@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import springmass as sm
 from acquisition.errors import NeedsAnswer
 from springmass.api.questions import as_arguments
-from springmass.commands.questions import as_options
+from springmass.commands.questions import option_words, quoted
 
 ROWS = "t,x,y\n" + "".join(f"{i / 20},{0.5 + i % 4},{0.25 + i % 3}\n" for i in range(60))
 
@@ -45,6 +45,6 @@ def test_an_answer_that_fits_nothing_is_not_repeated(path: Path) -> None:
 @given(st.text(st.characters(exclude_categories=["Cs", "Cc"]), min_size=1))
 def test_any_name_survives_the_shell_and_python(name: str) -> None:
     """What is suggested is taken apart to the very name, whatever signs are in it."""
-    words = shlex.split(as_options({"channel": name}))
+    words = shlex.split(" ".join(map(quoted, option_words({"channel": name}))))
     assert words in (["--channel", name], [f"--channel={name}"])
     assert eval(f"dict({as_arguments({'channel': name})})") == {"channel": name}
