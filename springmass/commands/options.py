@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Group, Parameter, Token
 
-from acquisition.recordings.reading import READ_FIELDS, Kind, ReadOptions, value_of
+from acquisition.recordings.reading import READ_FIELDS, ReadOptions, ValueKind, value_of
 from springmass.commands.parameters import Finite, LawName, PartsPerMillion, Positive, TcpPort, argument, flag, option
 from springmass.errors import ProgramError
 from springmass.loading.options import Accuracy, AnalysisOptions, LoadOptions
@@ -132,7 +132,7 @@ class PageOptions:
     law: LawName = None
 
 
-_TYPES = {Kind.NAME: str | None, Kind.POSITIVE: Positive | None, Kind.FILE: str | Path | None}
+_TYPES = {ValueKind.NAME: str | None, ValueKind.POSITIVE: Positive | None, ValueKind.FILE: str | Path | None}
 _UNVERIFIED = Annotated[bool, flag("read a run file despite a checksum mismatch")]
 
 
