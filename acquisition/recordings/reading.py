@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Self
 
 
-class Kind(Enum):
+class ValueKind(Enum):
     """What the value of an option is."""
 
     NAME = "name"
@@ -22,7 +22,7 @@ class Kind(Enum):
     FILE = "file"
 
 
-def _words(metavar: str, words: str, kind: Kind = Kind.NAME) -> Mapping[str, Any]:
+def _words(metavar: str, words: str, kind: ValueKind = ValueKind.NAME) -> Mapping[str, Any]:
     return {"metavar": metavar, "help": words, "kind": kind}
 
 
@@ -31,14 +31,14 @@ class ReadOptions:
     """The statements of a user about a file; None for each that is not made, then only the file's own are used."""
 
     velocity: str | Path | None = field(
-        default=None, metadata=_words("FILE", "velocity file that belongs to the position file", Kind.FILE)
+        default=None, metadata=_words("FILE", "velocity file that belongs to the position file", ValueKind.FILE)
     )
     channel: str | None = field(
         default=None, metadata=_words("NAME", "channel to use if there are several; for a wire log, the sensor")
     )
     run: str | None = field(default=None, metadata=_words("NAME", "run to use if there are several: name or number"))
     rate_hz: float | None = field(
-        default=None, metadata=_words("R", "samples per second if the file does not state them", Kind.POSITIVE)
+        default=None, metadata=_words("R", "samples per second if the file does not state them", ValueKind.POSITIVE)
     )
     unit: str | None = field(
         default=None, metadata=_words("U", "unit of the channel if the file does not state it: m, cm, rad, V ...")
@@ -81,7 +81,7 @@ def value_of(name: str, value: object) -> str | float:
     """Return the value of an option that a person wrote; ValueError says what it must be."""
     if name not in READ_FIELDS:
         raise ValueError(f"{name!r} is no option of reading; the options are {', '.join(READ_FIELDS)}")
-    if READ_FIELDS[name].metadata["kind"] is not Kind.POSITIVE:
+    if READ_FIELDS[name].metadata["kind"] is not ValueKind.POSITIVE:
         if not isinstance(value, str) or not value:
             raise ValueError(f"{name} must be a text, got {value!r}")
         return value

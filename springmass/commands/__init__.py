@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import App, Group, Parameter
 
 from springmass import __version__
+from springmass.commands.given import Given
 from springmass.errors import LOG, OK, ProgramError
 from springmass.layout import STDIN
 
@@ -101,7 +102,12 @@ def _begin(
         raise ProgramError("no command; try springmass demo or springmass --help")
     end = words.index("--") if "--" in words else len(words)
     named = [STDIN if word == "-" else word for word in words[:end]]
-    return int(app([*named, *words[end:]], exit_on_error=False, print_error=False) or OK)
+    line = [*named, *words[end:]]
+    command, bound, unparsed = app.parse_args(line, exit_on_error=False, print_error=False)
+    if "given" in unparsed:
+        declared = app[line[0]].assemble_argument_collection(default_parameter=app.default_parameter)
+        bound.arguments["given"] = Given.of(declared, line)
+    return int(command(*bound.args, **bound.kwargs) or OK)
 
 
 @app.command(name="--completion")

@@ -16,6 +16,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from springmass.commands.given import GivenOptions
 from springmass.commands.options import (
     FURTHER_OPTIONS,
     AnalysisArguments,
@@ -78,6 +79,7 @@ def analyse(
     read: ReadArguments = ReadArguments(),
     analysis: AnalysisArguments = AnalysisArguments(),
     bench: BenchOptions = BenchOptions(),
+    given: GivenOptions,
 ) -> int:
     """Analyse every input; if one fails, the others still give results."""
     inputs, how = [str(each) for each in recordings], analysis.of(read, options.method)
@@ -98,7 +100,12 @@ def analyse(
         for file, name, of_file in zip(files, names, of_files, strict=True)
     ]
     out = Path(options.output or ".") if not options.no_report and (options.output or not options.json) else None
+    if out is None:
+        given.refuse("without a report", "--template", "--figures")
+    if options.json:
+        given.refuse("on JSON", "--full", "--si")
     if not alone:
+        given.refuse("on several inputs", "--template", "--full")
         return _several(tasks, inputs, options, out, read)
     (run,) = analyse_all(tasks)
     if isinstance(run, Failed):

@@ -9,6 +9,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from springmass.commands.given import GivenOptions
 from springmass.commands.options import AnalysisArguments, FileArgument, ReadPairs, refuse
 from springmass.commands.parameters import PositiveCount, WholeNumber, argument, flag, option, output
 from springmass.commands.questions import for_course
@@ -48,6 +49,7 @@ def batch(
     options: BatchOptions = BatchOptions(),
     reading: ReadPairs = ReadPairs(),
     analysis: AnalysisArguments = AnalysisArguments(),
+    given: GivenOptions,
 ) -> int:
     """Analyse new and changed runs, and write the table and the page of all runs."""
     refuse("batch", reading.options, "velocity")
@@ -56,6 +58,7 @@ def batch(
     if not inputs and options.runs is None:
         raise ProgramError("batch needs recordings, folders or --runs FILE, got none of them")
     if options.template:
+        given.only("with --template", "--template")
         table = template([task.name for task in plan(inputs).tasks])
         # A file gets the paths unchanged, because they are read back from it.
         print(visible_lines(table) if sys.stdout.isatty() else table.removesuffix("\n"))

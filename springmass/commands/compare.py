@@ -14,6 +14,7 @@ from cyclopts import Parameter
 
 from acquisition.errors import visible
 from pipeline.findings.finding import kinds
+from springmass.commands.given import GivenOptions
 from springmass.commands.options import (
     AnalysisArguments,
     FiguresOption,
@@ -68,15 +69,19 @@ def compare(
     options: CompareOptions = CompareOptions(),
     reading: ReadPairs = ReadPairs(),
     analysis: AnalysisArguments = AnalysisArguments(),
+    given: GivenOptions,
 ) -> int:
     """Analyse every run, compare them, and print or write the result; for courses use the existing results."""
     refuse("compare", reading.options, "velocity")
     how = analysis.of(reading.options)
     inputs = [str(each) for each in recordings]
     if all(is_course(path) for path in inputs):
+        given.only("on courses, which are analysed already", "--json", "--strict")
         return _run_courses(inputs, options)
     if len(inputs) < 2:
         raise ProgramError(f"compare needs two runs at least, got {len(inputs)}; springmass analyse takes a single one")
+    if options.output is None:
+        given.refuse("without -o", "--figures")
     # Scenes are read first, so that their errors are found before an hour of recordings is read.
     scenes = read_scenes(options.scene, len(inputs))
     out = None if options.output is None else make_folder(options.output)
@@ -110,10 +115,6 @@ def _run_courses(inputs: Sequence[str], options: CompareOptions) -> int:
     from springmass.course.benches import compare_rows
     from springmass.terminal.printing import visible_lines
 
-    if options.output is not None or options.scene or options.reported is not None or options.hooke is not None:
-        raise ProgramError(
-            "-o, --scene, --reported and --hooke go with single runs; a course has its page and its scenes"
-        )
     rows = [{**row, COURSE: visible(folder)} for folder in inputs for row in read_rows(folder)[0]]
     compared = compare_rows(rows)
     print(

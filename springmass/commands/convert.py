@@ -8,6 +8,7 @@ from pathlib import Path, PurePath
 from typing import Annotated
 
 from acquisition.recordings.writers import WRITERS
+from springmass.commands.given import GivenOptions
 from springmass.commands.options import FileArgument, Overwrite, ReadArguments
 from springmass.commands.parameters import argument, option, output
 from springmass.errors import HINT, LOG, OK, UNREADABLE, ProgramError
@@ -32,12 +33,15 @@ def convert(
     scene: Annotated[FileArgument | None, option("FILE", "scene file to store in the run file")] = None,
     overwrite: Overwrite = False,
     read: ReadArguments = ReadArguments(),
+    given: GivenOptions,
 ) -> int:
     """Convert one input."""
     if output is not None and target is not None:
         raise ProgramError(f"convert writes one output, got {target} and -o {output}; name it once")
     if (output := target or output) is None:
         raise ProgramError(f"OUT is missing: convert {recording} to what? its suffix says the form")
+    if Path(output).suffix.lower() not in RUN_SUFFIXES:
+        given.refuse("on an output that is no run file", "--scene")
     given_scene = None if scene is None else read_scene(scene).to_mapping()
     loaded = load(recording, read)
     out = Path(output)

@@ -14,6 +14,7 @@ from acquisition.errors import NeedsAnswer, visible
 from acquisition.recordings.identify import Inspection, inspect
 from acquisition.recordings.identify import formats as every_format
 from acquisition.recordings.recording import Survey
+from springmass.commands.given import GivenOptions
 from springmass.commands.options import FileArgument, Json, ReadArguments
 from springmass.commands.parameters import argument
 from springmass.commands.questions import for_command, option_words
@@ -37,9 +38,11 @@ def formats(
     *,
     as_json: Json = False,
     read: ReadArguments = ReadArguments(),
+    given: GivenOptions,
 ) -> int:
     """List the formats, or describe a file."""
     if file is None:
+        given.only("without a file", "--json")
         table = {**{f.name: f.title for f in every_format()}, **OURS}
         lines = [f"{name:<16} {title}" for name, title in table.items()]
         titles = [{"name": name, "title": title} for name, title in table.items()]

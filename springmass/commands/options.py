@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Group, Parameter, Token
 
-from acquisition.recordings.reading import READ_FIELDS, Kind, value_of
+from acquisition.recordings.reading import READ_FIELDS, ReadOptions, ValueKind, value_of
 from springmass.commands.parameters import Finite, LawName, PartsPerMillion, Positive, TcpPort, argument, flag, option
 from springmass.errors import ProgramError
 from springmass.loading.options import Accuracy, AnalysisOptions, LoadOptions
@@ -132,7 +132,7 @@ class PageOptions:
     law: LawName = None
 
 
-_TYPES = {Kind.NAME: str | None, Kind.POSITIVE: Positive | None, Kind.FILE: str | Path | None}
+_TYPES = {ValueKind.NAME: str | None, ValueKind.POSITIVE: Positive | None, ValueKind.FILE: str | Path | None}
 _UNVERIFIED = Annotated[bool, flag("read a run file despite a checksum mismatch")]
 
 
@@ -142,20 +142,21 @@ def _declared(of: Field[Any]) -> tuple[str, Any, Any]:
     return of.name, Annotated[kind, words], field(default=None)
 
 
+def _arguments(name: str, base: type, *more: tuple[str, Any, Any]) -> type:
+    """Return a class of the options of reading as the command line has them, each with its words, and more."""
+    # Cyclopts looks into a class only if it names the module that it comes from.
+    words = {"__doc__": "The options of reading, each with its words.", "__module__": __name__}
+    declared = [*map(_declared, READ_FIELDS.values()), *more]
+    made = make_dataclass(name, declared, bases=(base,), namespace=words, frozen=True, kw_only=True)
+    return Parameter(name="*", group=HOW_READ)(made)
+
+
 if TYPE_CHECKING:
+    FileArguments = ReadOptions
     ReadArguments = LoadOptions
 else:
-    ReadArguments = Parameter(name="*", group=HOW_READ)(
-        make_dataclass(
-            "ReadArguments",
-            [*map(_declared, READ_FIELDS.values()), ("unverified", _UNVERIFIED, field(default=False))],
-            bases=(LoadOptions,),
-            # Cyclopts looks into a class only if it names the module that it comes from.
-            namespace={"__doc__": "The options of reading, each with its words.", "__module__": __name__},
-            frozen=True,
-            kw_only=True,
-        )
-    )
+    FileArguments = _arguments("FileArguments", ReadOptions)
+    ReadArguments = _arguments("ReadArguments", LoadOptions, ("unverified", _UNVERIFIED, field(default=False)))
 
 
 def _answer(text: str) -> tuple[str, Any]:

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
+from springmass.commands.given import GivenOptions
 from springmass.commands.options import PageOptions, ReadPairs, RecordingArgument
 from springmass.commands.parameters import flag
 from springmass.commands.questions import option_words
@@ -30,6 +31,7 @@ def page(
     page: PageOptions = PageOptions(),
     reading: ReadPairs = ReadPairs(),
     recorder: Annotated[bool, flag("used internally by `record --page`")] = False,
+    given: GivenOptions,
 ) -> int:
     """Serve the page until Ctrl-C; for a recording, until the recorder has ended and no browser shows the page."""
     path = Path(recording)
@@ -46,6 +48,7 @@ def page(
     if recorder:
         threading.Thread(target=_listen, args=(state, over), name="springmass-page-recorder", daemon=True).start()
     elif kind_of(path) == "wire":
+        given.refuse("on a wire log, which is shown as it grows", "--read", "--unverified")
         state.follow(path)
     else:
         loaded = load(path, reading.options)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 from acquisition.errors import visible
-from springmass.commands.options import FileArgument, ReadArguments, converted
+from springmass.commands.options import FileArgument, FileArguments, converted
 from springmass.commands.parameters import argument, option
 from springmass.errors import HINT, LOG, OK, ProgramError
 from springmass.loading.inputs import files_of
+from springmass.loading.options import LoadOptions
 
 SCENE_TEMPLATE = """\
 # What was at the bench. Remove the # before what you measured, and put your numbers for the dots.
@@ -74,7 +74,7 @@ def scene(
         tuple[tuple[float, str], ...],
         converted("S=TEXT", "a mark S seconds into the recording; may be repeated", _mark),
     ] = (),
-    read: ReadArguments = ReadArguments(),
+    read: FileArguments = FileArguments(),
 ) -> int:
     """Print the template, check a scene, or note scene, remarks and marks beside a recording."""
     from pipeline.bench.scene import Scene
@@ -83,10 +83,8 @@ def scene(
     from springmass.loading.notes import about_of, keep_answers, write_about
     from springmass.loading.scenes import ask_about, read_scene, stated_keys
 
-    given = read.about_the_file().given()
-    if read.unverified:
-        raise ProgramError("--unverified is for one command and not kept; leave it out")
-    noted = scene is not None or note or mark or given
+    answers = read.given()
+    noted = scene is not None or note or mark or answers
     if check is not None:
         if recordings or noted:
             raise ProgramError("--check looks at a scene file alone; leave the rest out")
@@ -116,11 +114,11 @@ def scene(
         raise ProgramError(f"{missing}: expected a recording, got none; check the name")
     stated = None if scene is None else read_scene(scene)
     opened = []
-    for each in files if given else ():  # all are read before any notes are written
-        loaded = load(each.path, read if each.velocity is None else replace(read, velocity=each.velocity))
+    for each in files if answers else ():  # all are read before any notes are written
+        loaded = load(each.path, LoadOptions(**({"velocity": each.velocity} | answers)))
         opened.append((Path(each.path), loaded.sha256))
     for path, sha256 in opened:
-        keep_answers(path, given, sha256)
+        keep_answers(path, answers, sha256)
     for path in (Path(each.path) for each in files):
         about = about_of(path)
         if stated is not None or note or mark:

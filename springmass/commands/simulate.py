@@ -15,6 +15,7 @@ from pipeline.dynamics.band import Band
 from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError
 from pipeline.results.effects import Effect, simulated_effects
+from springmass.commands.given import GivenOptions
 from springmass.commands.options import FiguresOption, FileArgument, Json, Overwrite, ReadPairs
 from springmass.commands.parameters import Finite, Positive, Whole, flag, option, output
 from springmass.errors import HINT, LOG, OK, ProgramError
@@ -68,10 +69,17 @@ def simulate(
     figures: FiguresOption = (),
     as_json: Json = False,
     reading: ReadPairs = ReadPairs(),
+    given: GivenOptions,
 ) -> int:
     """Print what the scene implies, its uncertainty and the cost; solve the equation and write the output."""
     if scene is None and against is None:
         raise ProgramError("simulate needs --scene S.toml, or --against RUN with a scene of its own")
+    if against is None:
+        given.refuse("without --against", "--read", "--unverified")
+    if output is None:
+        given.refuse("without -o", "--sensor", "--seed", "--overwrite")
+    if folder is None and (as_json or output is not None):
+        given.refuse("without --folder", "--figures")
     where, say = str(against if scene is None else scene), sys.stderr if as_json else sys.stdout
     if output is not None and Path(output).exists() and not overwrite:
         raise ProgramError(f"{visible(str(output))}: exists; take another name, or --overwrite")

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 from pipeline.analysis import Oscillation
 from springmass import __version__
+from springmass.commands.given import GivenOptions
 from springmass.commands.options import AnalysisArguments, FileArgument, Json, ReadPairs
 from springmass.commands.parameters import Positive, PositiveCount, argument, option
 from springmass.errors import OK, UNREADABLE, ProgramError
@@ -35,8 +36,13 @@ def trade(
     as_json: Json = False,
     reading: ReadPairs = ReadPairs(),
     how: AnalysisArguments = AnalysisArguments(),
+    given: GivenOptions,
 ) -> int:
     """Simulate records of one motion, evaluate them with every tier, and solve the motion with every integrator."""
+    if recording is not None:
+        given.refuse("on the motion of a recording", "--seconds")
+    else:
+        given.only("without a recording", "--scene", "--seeds", "--seconds", "--json")
     motion = TrueMotion(seconds=seconds)
     given_scene = None if scene is None else read_scene(scene)
     if recording is not None:

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.recordings.identify import dialect_folder
-from acquisition.recordings.reading import READ_FIELDS, Kind
+from acquisition.recordings.reading import READ_FIELDS, ValueKind
 from acquisition.regular_file import open_regular, read_regular
 from pipeline.bench.scene import PLACES, Scene
 from pipeline.registry.laws import ANY_LAW, law_names
@@ -276,7 +276,7 @@ def _tags(path: Path, names: Sequence[str]) -> tuple[str, ...]:
 def _values(folder: Path, row: Row) -> Values:
     texts = row.cells
     values: dict[str, Any] = {name: text for name, text in texts.items() if name != "path" and name not in _U}
-    numeric = [name for name, each in READ_FIELDS.items() if each.metadata["kind"] is Kind.POSITIVE]
+    numeric = [name for name, each in READ_FIELDS.items() if each.metadata["kind"] is ValueKind.POSITIVE]
     values |= {name: row.number(name) for name in (*numeric, *OF_ANALYSIS) if name in texts}
     values |= {name: os.path.join(folder, texts[name]) for name in ("scene", "velocity") if name in texts}
     for name in PLACES:

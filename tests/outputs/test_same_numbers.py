@@ -83,8 +83,8 @@ def compare_all(path: Path, answers: Mapping[str, Any], folder: Path, accuracy: 
     assert numbers_of(of_report["estimates"]) == numbers
     assert [finding["code"] for finding in of_report["findings"]] == codes
 
-    given = [word for word in options if not word.startswith("--velocity")]
     if "velocity" not in answers:
+        given = ["--accuracy", accuracy, *(f"--read={name}={value}" for name, value in answers.items())]
         run("batch", path, "-o", folder / "course", "--jobs", "1", "--reports", "0", *given)
         with (folder / "course" / "results.csv").open(encoding="utf-8", newline="") as table:
             (row,) = csv.DictReader(table)
