@@ -9,8 +9,8 @@ PIP = $(BIN)/python -m pip --disable-pip-version-check install --quiet -c constr
 
 help:
 	@echo "make demo     from two old recordings to Table 1 and a report"
-	@echo "make test     the tests, in two processes (WORKERS=n for others): 4 minutes on two cores"
-	@echo "make golden   every frozen output against today's, as a table of what moved: 3 minutes"
+	@echo "make test     the tests, in two processes (WORKERS=n for others): 3 minutes on two cores"
+	@echo "make golden   every frozen output against today's, as a table of what moved: 1 minute"
 	@echo "make golden-freeze  freeze the outputs that moved; the commit's message says what moved and why"
 	@echo "make trials   what many seeds, kills and long runs show: an hour"
 	@echo "make nightly  trials, docs, firmware, smallest versions, planted faults and checks of the project's files: two hours"
