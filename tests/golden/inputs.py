@@ -20,6 +20,8 @@ import numpy as np
 import tomli_w
 
 from tests.synthetic import F8, LAW_TRUTHS, Truth, times
+from tests.trials.troubles.kinds import KINDS
+from tests.trials.troubles.record import Kind
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -63,9 +65,7 @@ def missing(words: list[str]) -> bool:
 
 
 @cache
-def _kinds() -> dict[str, object]:
-    from tests.trials.troubles.kinds import KINDS
-
+def _kinds() -> dict[str, Kind]:
     return {trouble_name(kind.name): kind for kind in KINDS}
 
 
@@ -76,10 +76,11 @@ def trouble_name(name: str) -> str:
 
 def _trouble(path: Path) -> None:
     """Write the record of a kind of trouble as text, and its scene next to it."""
-    name = path.name.removesuffix("".join(path.suffixes[-2:]) if path.name.endswith(".scene.toml") else path.suffix)
+    of_scene = path.name.endswith(".scene.toml")
+    name = path.name.removesuffix(".scene.toml") if of_scene else path.stem
     # An odd seed draws mixed drag: no record of one law alone.
-    record = _kinds()[name].make(1)  # type: ignore[attr-defined]
-    if path.name.endswith(".scene.toml"):
+    record = _kinds()[name].make(1)
+    if of_scene:
         path.write_text(tomli_w.dumps(record.scene), "utf-8")
     elif record.text is not None:
         path.write_bytes(record.text)
@@ -231,7 +232,7 @@ def _damaged(path: Path) -> None:
 
 
 def _course(folder: Path) -> None:
-    """Make a course of eight runs, some of them of the same bob, with a table of what is known of each."""
+    """Make a course of eight runs: four bundled recordings, two modes, a relaxation, a bob at rest and velocities."""
     folder.mkdir()
     for name in COURSE:
         shutil.copy(ROOT / "sample_data" / f"{name}_simulated_position.txt", folder)
