@@ -22,6 +22,7 @@ from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.tables.format import text_format
 from acquisition.recordings.tables.headings import Heading, headings_of, is_time, split_heading
 from acquisition.recordings.tables.layout import (
+    are_named_times,
     are_row_numbers,
     columns_of,
     find_table,
@@ -30,10 +31,10 @@ from acquisition.recordings.tables.layout import (
     times_by_steps,
     wrong_commas,
 )
-from acquisition.recordings.tables.numbers import parse_number
+from acquisition.recordings.tables.numbers import is_lost, parse_number
 from acquisition.recordings.tables.table import Header
 from acquisition.recordings.tables.text import Text, decode, in_turn
-from acquisition.recordings.tables.times import clock_s
+from acquisition.recordings.tables.times import clock_s, clock_times, is_newest_first, is_time_cell
 from acquisition.units import measure_of, time_unit
 
 _MONITOR = re.compile(
@@ -57,18 +58,22 @@ def header(lines: Sequence[str]) -> Header | None:
     # The last row may be incomplete.
     columns = columns_of(table.rows[:-1] if len(table.rows) > _FEWEST else table.rows)
     headings, words = _units_beside(table)
-    times, formula, traps = times_by_name(headings, columns), table.formula, list(table.traps)
-    clocks = [at for at, cell in enumerate(table.rows[0]) if clock_s(cell) and parse_number(cell) is None]
-    clock = None
+    table = replace(table, headings=headings)
+    times, formula, traps = times_by_name(table, columns), table.formula, list(table.traps)
+    clocks = [at for at, cells in enumerate(zip(*table.rows, strict=True)) if _are_clocks(cells)]
+    unread = "" if times or formula is not None else _unread_times(table, clocks)
     if not times and formula is None and clocks:
-        clock = clocks[0]
-        headings[clock] = replace(headings[clock], unit="s")
-        times = [clock]
-        traps.append(FormatIssue("clock_times", f"the file gives times of day; here time 0 is {table.rows[0][clock]}"))
+        # Of several clocks one may be the same in all rows.
+        clock = max(clocks, key=lambda at: (len({row[at] for row in table.rows}) > 1, is_time(headings[at].name), -at))
+        for at in clocks:
+            headings[at] = replace(headings[at], unit="s")
+        times, unread, first = [clock], "", table.rows[0][clock]
+        if clock_s(first) and not is_newest_first(clock_times([row[clock].encode() for row in table.rows])[0]):
+            traps.append(FormatIssue("clock_times", f"the file gives times of day; here time 0 is {first}"))
     bare = not table.named and table.lines == 0 and all(parse_number(cell) is not None for cell in table.rows[0])
     # A single column besides row numbers contains measured values, even if it rises.
     numbered = bare and len(columns) > 1 and are_row_numbers(columns[0])
-    if not times and formula is None and not (bare and len(columns) <= 1 + numbered):
+    if not times and formula is None and not unread and not (bare and len(columns) <= 1 + numbered):
         guess = times_by_steps(headings, columns)
         if guess is not None:
             times = [guess]
@@ -95,9 +100,26 @@ def header(lines: Sequence[str]) -> Header | None:
         headings=[marked(at, each) for at, each in enumerate(headings)],
         ragged=len(values) > 1,
         traps=tuple(traps),
-        clock=clock,
+        clocks=tuple(clocks) if not formula and set(times) <= set(clocks) else (),
+        unread_times=unread,
         refused=(problem, remedy) if wrong_commas(table) else None,
     )
+
+
+def _are_clocks(cells: Sequence[str]) -> bool:
+    """Return whether the cells of a column are times of day or durations, and no numbers."""
+    filled = [cell for cell in cells if cell and not is_lost(cell)]
+    return bool(filled) and all(parse_number(cell) is None and is_time_cell(cell) for cell in filled[:_FEWEST])
+
+
+def _unread_times(table: Header, clocks: Sequence[int]) -> str:
+    """Return what is wrong with a column that is named as times and is none; empty if there is no such column."""
+    for at, each in enumerate(table.headings):
+        if at not in clocks and are_named_times(each):
+            cells = [row[at] for row in table.rows if row[at]]
+            if cells and parse_number(cells[0]) is None:
+                return f'the times in column "{each.name}" cannot be read, the first is "{cells[0][:40]}"'
+    return ""
 
 
 def _headed(lines: Sequence[str]) -> Header | None:

@@ -20,7 +20,7 @@ from acquisition.recordings.tables.layout import runs_forward
 from acquisition.recordings.tables.numbers import UNREAD_CELL
 from acquisition.recordings.tables.table import Column, Lines, Table, side_by_side
 from acquisition.recordings.tables.text import Text, in_turn, is_text, text_of
-from acquisition.recordings.tables.times import CLOCK, clock_times, count_from_first
+from acquisition.recordings.tables.times import CLOCK, clock_times
 
 _FEWEST, _SHARE, _MOST, _HEAD = 3, 0.6, 40, 120
 _BRACKETS = re.compile(r"\s*[(\[]")  # as Python prints tuples and lists
@@ -89,8 +89,7 @@ def _tables(path: str, data: bytes) -> list[Table]:
         columns.append(Column("", "", values, np.array(forms, np.int8)))
     stamps = [match[0].strip(" [").encode() if (match := _CLOCK.match(line)) else b"" for line, _ in rows]
     if all(stamp or not of_line for stamp, (_, of_line) in zip(stamps, rows, strict=True)):
-        columns.insert(0, Column("", "", *clock_times(stamps)[:2]))
-        count_from_first(columns[0])
+        columns.insert(0, Column("", "", *clock_times(stamps)))
         headings.insert(0, Heading("Time", "s", role="time"))
     numbered = np.array([number for number, _, _ in lines[first:stop]])
     where = Lines(numbered, np.zeros(len(rows), bool), zeros=text.zeros)

@@ -14,6 +14,7 @@ from acquisition.recordings.questions import Missing, MissingItem, Question
 from acquisition.recordings.reading import READ_DEFAULTS, ReadOptions
 from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.sampling.timing import median, rate_needed
+from acquisition.recordings.tables.blocks import runs_of
 from acquisition.recordings.tables.headings import BRACKETED, name_and_unit
 from acquisition.recordings.tables.table import Column, Table
 from acquisition.recordings.tables.vocabulary import DERIVED, OSCILLATES, POSITION_WORDS, UNIT_OF_NAME
@@ -28,6 +29,7 @@ _FIRST_ROWS = 50
 _SOME = 20_000
 _FEWEST_ROWS, _FEWEST_TURNS, _MOST_NAMES = 20, 4, 4
 _SHARE_OF_RESTARTS = 0.2
+_READ_TIMES = "write them in seconds or like 2025-04-17 17:00:08.010; or state the rate, if you know it"
 _EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
 """Units of times since 1970, each with the minimum of the numbers to which it applies."""
 Channel = tuple[Table, Column]
@@ -42,10 +44,10 @@ def choose_channel(path: str, tables: Sequence[Table], answers: ReadOptions) -> 
     sizes = {run: max(_rows(table) for table in tables if table.run == run) for run in runs}
     run = max(runs, key=lambda each: sizes[each])  # the first of the longest
     if answers.run is not None:
-        if runs == ("",) and answers.run:
+        if runs == ("",) and answers.run and answers.time is None:
             problem = f'the file has one run without a name, got run "{answers.run}"'
             raise FormatError(path, problem, "leave run out")
-        run = runs[_index_of_name(path, Missing.RUN, [(each,) for each in runs], answers.run)]
+        run = runs[_index_of_name(path, Missing.RUN, [(each,) for each in runs], answers.run) if runs != ("",) else 0]
     elif len(runs) > 1:
         needs.append(MissingItem(Missing.RUN, runs, run))
     channels = [(table, column) for table in tables if table.run == run for column in table.columns]
@@ -58,12 +60,13 @@ def choose_channel(path: str, tables: Sequence[Table], answers: ReadOptions) -> 
         if len(fit) > 1:
             needs.append(MissingItem(Missing.CHANNEL, tuple(each.name for _, each in fit), column.name))
     if answers.time is not None:
-        table = _timed_by(path, table, column, answers.time)
+        table = _run_of(path, runs_of(_timed_by(path, table, column, answers.time)), answers.run)
+        column = next((each for each in table.columns if each.name == column.name), column)
     if table.times is not None and table.lines is not None and _restarts(table.times):
         table = replace(table, times=None, formula=None)  # chunks of times, with unknown intervals between them
     if answers.time_unit is not None:
         table = _with_time_unit(path, table, answers.time_unit)
-    needs.extend(_missing_times([each for _, each in channels], table, column, answers))
+    needs.extend(_missing_times(path, [each for _, each in channels], table, column, answers))
     if column.measure is None and answers.unit is None:
         needs.append(_unit_needed(column))
     if needs:
@@ -200,8 +203,20 @@ def _timed_by(path: str, table: Table, column: Column, time: str) -> Table:
         raise FormatError(path, f'"{time}" cannot be both channel and time', "name another column for one of them")
     if table.lines is None and times.values.size != column.values.size:
         raise FormatError(path, f'"{time}" and "{column.name}" differ in length', "name another column of times")
+    if not np.isfinite(times.values).any():
+        raise FormatError(path, f'the times in column "{times.name}" cannot be read', _READ_TIMES)
     unit = times.unit if time_unit(times.unit) is not None else ""
     return replace(table, times=replace(times, unit=unit), formula=None)
+
+
+def _run_of(path: str, parts: Sequence[Table], run: str | None) -> Table:
+    """Return the run that the user names, of the runs that the named times make of a table."""
+    if len(parts) == 1:
+        return parts[0]
+    names = tuple(each.run for each in parts)
+    if run is None:
+        raise NeedsAnswer(Question(path, (MissingItem(Missing.RUN, names, names[0]),)))
+    return parts[_index_of_name(path, Missing.RUN, [(each,) for each in names], run)]
 
 
 def _with_time_unit(path: str, table: Table, unit: str) -> Table:
@@ -215,10 +230,14 @@ def _with_time_unit(path: str, table: Table, unit: str) -> Table:
     return replace(table, times=replace(table.times, unit=unit))
 
 
-def _missing_times(columns: Sequence[Column], table: Table, column: Column, answers: ReadOptions) -> list[MissingItem]:
+def _missing_times(
+    path: str, columns: Sequence[Column], table: Table, column: Column, answers: ReadOptions
+) -> list[MissingItem]:
     if not table.is_timed:
         if answers.rate_hz is not None:
             return []
+        if table.unread_times:
+            raise FormatError(path, table.unread_times, _READ_TIMES)
         others = tuple(each.name for each in columns if each.name != column.name)
         return [rate_needed(MissingItem(Missing.TIME, others, others[0]) if others else None)]
     if table.times is None or table.formula is not None or time_unit(table.times.unit) is not None:

@@ -35,10 +35,33 @@ NEUTRAL = _pattern(
 """Names that do not prevent a column from being read as the times."""
 SPAN = _pattern(r"^(?-i:T)\b|^[Ττ]|period|durat|dauer|half|halb|interval|tau|delay|[dΔ]t|mean|10")
 """Names of durations, which are not times of samples."""
-AM_PM = {
-    "am": "am a.m. a.m a. m. de. öö ap. πμ ص ق.ظ. 上午 午前 오전 sa fm f.m. dop. dopoledne vorm. पूर्वाह्न",
-    "pm": "pm p.m. p.m p. m. du. ös ip. μμ م ب.ظ. 下午 午後 오후 ch em e.m. odp. odpoledne nachm. अपराह्न",
-}
+AM = _pattern(
+    r"(?<![^\W\d_])"
+    r"(?:a\.? ?m\.?|de\.|öö|πμ|π\.μ\.|ص|ق\.ظ\.|上午|午前|早上|오전|sa|fm|f\.m\.|dop\.|vm\.?|vorm\.)(?![^\W\d_])"
+)
+PM = _pattern(
+    r"(?<![^\W\d_])"
+    r"(?:p\.? ?m\.?|du\.|ös|μμ|μ\.μ\.|م|ب\.ظ\.|下午|午後|晚上|오후|ch|em|e\.m\.|odp\.|nm\.?|nachm\.)(?![^\W\d_])"
+)
+"""Words for the halves of the day; the word for the second half is looked for first."""
+MONTHS = tuple(
+    words(stems)
+    for stems in (
+        "jan gen ene янв січ ιαν oca sty led tammi jän كانون يناير",
+        "feb fév fev фев лют φεβ şub lut úno helmi فبراير",
+        "mar mär mrt мар бер μαρ bře maalis mär مارس",
+        "apr avr abr апр кві απρ nis kwi dub huhti ápr أبريل",
+        "may mai mei mag maj máj мая май тра μαΐ μαϊ μάι kvě touko مايو",
+        "jun juin giu июн чер ιουν haz cze čvn červn kesä jún يونيو",
+        "jul juil lug июл лип ιουλ tem lip čvc červenec heinä júl يوليو",
+        "aug ago aoû aou авг сер αυγ ağu sie srp elo أغسطس",
+        "sep set сен вер σεπ eyl wrz zář syys szep سبتمبر",
+        "oct okt ott out окт жов οκτ eki paź říj loka أكتوبر",
+        "nov noi ноя лис νοέ νοε kas lis marras نوفمبر",
+        "dec dez déc dic дек гру δεκ ara gru pro joulu ديسمبر",
+    )
+)
+"""Stems of the names of the twelve months; the longest that fits decides."""
 
 # Row numbers and uncertainties
 
