@@ -1,24 +1,34 @@
-"""The grammar of blocks: rows whose times start again are runs of their own, and are never joined.
+"""The grammar of blocks: which rows of a table belong together.
 
-The times are first put in order by the rules of :mod:`acquisition.recordings.tables.times`.
+1. Rows whose times start again are runs of their own, and are never joined. The times are first put in order by the
+   rules of :mod:`acquisition.recordings.tables.times`.
+2. A column of units gives the unit of each row (:func:`with_units_of_rows`).
+3. A column of words that names the sensor or the quantity of each row makes a channel of each (:func:`by_label`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquisition.block import F8, I8
 from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.sampling.timing import median
-from acquisition.recordings.tables.table import Lines, Table
+from acquisition.recordings.tables.headings import Heading
+from acquisition.recordings.tables.numbers import scaled
+from acquisition.recordings.tables.table import Column, Lines, Table
 from acquisition.recordings.tables.times import in_order, is_newest_first, out_of_place
+from acquisition.recordings.tables.vocabulary import ANY_VALUE, LABEL
+from acquisition.units import Measure, measure_of, time_unit
 
 _FEWEST_ROWS = 8
 """Usual number of rows from which on a block is a run; times of shorter blocks begin again every few rows."""
+_MOST_LABELS, _SHARE_OF_CHANGES = 20, 0.1
 _NEAR = 3  # rows before and after a step back that must lie on its two sides
 
 
@@ -90,3 +100,74 @@ def _blocks(lines: Lines | None, edges: Sequence[int]) -> list[I8]:
     if lines is None:
         return blocks
     return [rows[: int(np.flatnonzero(~lines.words[rows])[-1]) + 1] for rows in blocks]
+
+
+def with_units_of_rows(
+    columns: Sequence[Column], headings: Sequence[Heading]
+) -> tuple[tuple[Column, ...], list[Heading]]:
+    """Return columns in the largest unit that a column of units to their right gives their rows, and the headings."""
+    read, of = list(columns), list(headings)
+    for at, column in enumerate(columns):
+        if not at or column.words is None or at >= len(of):
+            continue
+        units = {word: measure_of(word) or time_unit(word) for word in np.unique(column.words).tolist() if word}
+        known = {word: each for word, each in units.items() if each is not None}
+        if not known or len(known) < len(units) or len({each.quantity for each in known.values()}) > 1:
+            continue
+        if len(known) > 1 or not of[at - 1].unit:
+            largest = max(known.values(), key=lambda each: 10.0**each.power * each.factor)
+            read[at - 1] = _in_unit(read[at - 1], column.words, known, largest)
+            of[at - 1] = replace(of[at - 1], unit=largest.symbol)
+    return tuple(read), of
+
+
+def _in_unit(column: Column, words: NDArray[np.str_], units: Mapping[str, Measure], unit: Measure) -> Column:
+    values, forms = column.values.copy(), column.forms.copy()
+    for word, measure in units.items():
+        rows = np.flatnonzero(words == word)
+        rows = rows[rows < values.size]
+        if measure != unit:
+            power = measure.power - unit.power
+            values[rows] = scaled(values[rows], forms[rows], power) * (measure.factor / unit.factor)
+            forms[rows] = np.where(forms[rows] >= power, forms[rows] - power, np.minimum(forms[rows], 0))
+    return replace(column, values=values, decimals=forms, words=words if len(units) > 1 else None)
+
+
+def by_label(tables: Sequence[Table]) -> list[Table]:
+    """Return tables in which a column of words that tells rows apart makes channels, each with its own rows."""
+    return [part for table in tables for part in _by_label(table)]
+
+
+def _by_label(table: Table) -> list[Table]:
+    for column in table.beside:
+        if column.words is None or table.lines is None or not table.columns:
+            continue
+        labels, counts = np.unique(column.words[column.words != ""], return_counts=True)
+        if not 2 <= labels.size <= _MOST_LABELS or counts.min() < _FEWEST_ROWS or not _tells_apart(table, column):
+            continue
+        tables = []
+        for label in labels.tolist():
+            part = _taken(table, np.flatnonzero(column.words == label))
+            names = [label if each.name.lower() in ANY_VALUE else f"{each.name} {label}" for each in part.columns]
+            named = tuple(replace(each, name=name) for each, name in zip(part.columns, names, strict=True))
+            tables.append(replace(part, columns=named))
+        return tables
+    return [table]
+
+
+def _tells_apart(table: Table, column: Column) -> bool:
+    """Return whether words name sensors or quantities: by their heading, or because values go on from like to like."""
+    if LABEL.intersection(re.findall(r"[^\W\d_]+", column.name.lower())):
+        return True
+    words = column.words
+    if words is None:
+        return False
+    changes = words[1:] != words[:-1]
+    for each in table.columns:
+        values = each.of_size(words.size).values
+        within = [np.abs(np.diff(values[words == label])) for label in np.unique(words[words != ""]).tolist()]
+        steps, across = np.concatenate(within), np.abs(np.diff(values))[changes]
+        steps, across = steps[np.isfinite(steps)], across[np.isfinite(across)]
+        if np.mean(changes) > _SHARE_OF_CHANGES and across.size and steps.size and median(steps) < 0.5 * median(across):
+            return True
+    return False

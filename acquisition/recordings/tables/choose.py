@@ -84,9 +84,12 @@ def measure(path: str, column: Column, unit: str | None) -> tuple[Measure, tuple
         raise FormatError(path, f'unit must be one of {", ".join(MEASURES)}, got "{unit}"', "name one of these")
     if of_file == given:
         return given, ()
-    if of_file is not None and (of_file.quantity in ("length", given.quantity)):
-        problem = f'unit must be {unit_words(column.unit)} as stated by "{column.label}", got "{unit}"'
-        raise FormatError(path, problem, "leave the unit out")
+    if of_file is not None and column.words is not None:
+        problem = f'each row of "{column.name}" states its unit, got "{unit}"'
+        raise FormatError(path, problem, f"leave the unit out, or state {of_file.symbol}")
+    if of_file is not None and of_file.quantity == given.quantity:
+        message = f'you stated the unit {unit} for "{column.label}": the unit of the file is not used'
+        return given, (FormatIssue("unit_given", message),)
     if not column.unit:
         return given, (FormatIssue("unit_given", f'you stated the unit of "{column.name}": {unit}'),)
     holds = "times, frequencies and damping rates are not affected"

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquisition.block import B1, F8, I8
 from acquisition.recordings.recording import FormatIssue
@@ -34,6 +35,8 @@ class Column:
         -3 for a cell that is not a number. None for binary numbers.
     aside : bool
         Whether it is an auxiliary column (row numbers, an uncertainty), which is read only if the user names it.
+    words : (n,) array of str or None
+        The text of its cells, if rows are told apart by it.
     """
 
     name: str
@@ -41,6 +44,7 @@ class Column:
     values: F8
     decimals: I1 | None = None
     aside: bool = False
+    words: NDArray[np.str_] | None = None
 
     @property
     def forms(self) -> I1:
@@ -73,7 +77,8 @@ class Column:
         """Return its rows with these numbers, as far as it has them."""
         rows = rows[rows < self.values.size]
         decimals = None if self.decimals is None else self.decimals[rows]
-        return replace(self, values=self.values[rows], decimals=decimals)
+        words = None if self.words is None else self.words[rows]
+        return replace(self, values=self.values[rows], decimals=decimals, words=words)
 
     def of_size(self, size: int) -> Column:
         """Return the column with empty cells up to a size."""
@@ -149,6 +154,8 @@ class Header(TableFacts):
         One for each column.
     clocks : tuple of int
         Columns of times of day or durations.
+    words : tuple of int
+        Columns of text that may hold the units of each row, or tell its rows apart.
     refused : tuple of str or None
         Why the rows cannot be read, and what to do.
     rows : tuple of tuple of str
@@ -160,6 +167,7 @@ class Header(TableFacts):
     delimiter: str
     headings: Sequence[Heading]
     clocks: tuple[int, ...] = ()
+    words: tuple[int, ...] = ()
     refused: tuple[str, str] | None = None
     rows: tuple[tuple[str, ...], ...] = ()
 

@@ -103,3 +103,10 @@ LOST = words(
     "ovrflw ovfl under underrange underflow #value! #div/0! #ref! #num! #null! #name? missing invalid lost timeout"
 )
 """Words in a column of numbers that an instrument or a sheet writes where it has no number."""
+LABEL = words(
+    "sensor sensors channel probe device source quantity variable field series parameter topic id name key signal "
+    "metric tag label kanal größe messgröße sonde capteur canal grandeur variable magnitud entity node station"
+)
+"""Words in the heading of a column that tells rows of several sensors or quantities apart."""
+ANY_VALUE = frozenset(("", *words("value values _value reading result wert messwert valeur valor valore data")))
+"""Names of a column whose rows are of several quantities."""

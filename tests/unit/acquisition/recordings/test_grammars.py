@@ -246,3 +246,90 @@ def test_a_column_of_times_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match='"Time"'):
         read(tmp_path, text, time="Time")
     holds(read(tmp_path, text, rate_hz=20.0))
+
+
+# Blocks
+
+OTHER = np.round(9.0 + 0.5 * np.cos(4.0 * T), 3)
+
+
+@pytest.mark.parametrize("heading", ["sensor", "who", "_field"])
+@pytest.mark.parametrize("in_turn", [True, False])
+def test_rows_of_several_sensors_are_channels(tmp_path: Path, heading: str, in_turn: bool) -> None:
+    """A long table has one reading a row, and the name of the sensor in a column of words."""
+    a, b = (
+        [f"{t + late:.3f},{name},{x:.3f}" for t, x in zip(T, values, strict=True)]
+        for name, values, late in (("left", X, 0.0), ("right", OTHER, 0.008))
+    )
+    rows = [row for pair in zip(a, b, strict=True) for row in pair] if in_turn else a + b
+    text = "\n".join([f"time_s,{heading},distance_cm", *rows, ""])
+    if not in_turn and heading == "who":  # words that change once are a state
+        text = text.replace("who", "sensor")
+    with pytest.raises(NeedsAnswer) as asked:
+        read(tmp_path, text)
+    assert asked.value.question.needs[0].choices == ("distance left", "distance right")
+    holds(read(tmp_path, text, channel="distance left"))
+    holds(read(tmp_path, text, channel="distance right"), T + 0.008, OTHER)
+
+
+def test_a_state_in_words_is_no_sensor(tmp_path: Path) -> None:
+    """Values go on from row to row, whatever the words say."""
+    rows = [f"{t:.2f},{'low' if row % 3 else 'ok'},{x:.3f}" for row, (t, x) in enumerate(zip(T, X, strict=True))]
+    holds(read(tmp_path, "\n".join(["Time (s),state,Position (cm)", *rows, ""])))
+
+
+UNITS_OF_ROWS = {
+    "column": ("Time (s),Value,Unit", "{t:.2f},{x},{u}"),
+    "behind, in cells": ("Time (s);Value", "{t:.2f};{x} {u}"),
+    "behind both": ("Time;Value", "{t:.2f} s;{x} {u}"),
+    "blanks": ("", "{t:.2f} {x} {u}"),
+}
+
+
+@pytest.mark.parametrize("form", UNITS_OF_ROWS)
+def test_the_unit_of_each_row_is_used(tmp_path: Path, form: str) -> None:
+    """Instruments choose the unit of each value; an answer that contradicts the rows is refused."""
+    head, row = UNITS_OF_ROWS[form]
+    values = np.round(100.0 + X, 2)
+    cells = [(f"{x / 100:.4f}", "m") if x >= 100 else (f"{10 * x:.1f}", "mm") for x in values]
+    text = "\n".join(
+        [*filter(None, [head]), *(row.format(t=t, x=x, u=u) for t, (x, u) in zip(T, cells, strict=True)), ""]
+    )
+    holds(read(tmp_path, text), x=values)
+    with pytest.raises(FormatError, match="states its unit"):
+        read(tmp_path, text, unit="cm")
+
+
+LINES = {
+    "numpy": ("{t}\n{x}\n", ","),
+    "MATLAB": ("t = [{t}];\nx = [{x}];\n", " "),
+    "names": ("Time (s);{t}\nPosition (cm);{x}\n", ";"),
+}
+
+
+@pytest.mark.parametrize("form", LINES)
+def test_two_long_lines_are_two_columns(tmp_path: Path, form: str) -> None:
+    """``numpy.savetxt`` of two arrays writes a line for each, longer than the head of a file."""
+    t = np.arange(3000) / 20
+    x = np.round(5.0 * np.cos(6.0 * t), 3)
+    line, mark = LINES[form]
+    text = line.format(t=mark.join(f"{each:.2f}" for each in t), x=mark.join(f"{each:.3f}" for each in x))
+    answers = {} if form == "names" else {"unit": "cm"}
+    holds(read(tmp_path, text, **answers), t, x)
+
+
+def test_annotated_csv_of_influxdb(tmp_path: Path) -> None:
+    """The bounds of the query are not the times of the rows."""
+    head = "#group,false,false,true,true,false,false,true\n#datatype,string,long,dateTime:RFC3339,dateTime:RFC3339,"
+    head += "dateTime:RFC3339,double,string\n#default,_result,,,,,,\n,result,table,_start,_stop,_time,_value,_field\n"
+    bounds = "2024-05-01T10:00:00Z,2024-05-01T11:00:00Z"
+    rows = [f",,0,{bounds},{at.isoformat()}Z,{x:.3f},distance" for at, x in zip(MOMENTS, X, strict=True)]
+    holds(read(tmp_path, "\n".join([head + rows[0], *rows[1:], ""]), unit="cm"))
+
+
+def test_an_answer_beats_the_heading(tmp_path: Path) -> None:
+    """A person who states the unit knows better; it is noted."""
+    text = table([f"{t:.2f}" for t in T], [f"{x:.3f}" for x in X], head="Time (s);Position (m)")
+    recording = read(tmp_path, text, unit="cm")
+    holds(recording)
+    assert [each for each in recording.traps if each.code == "unit_given"]
