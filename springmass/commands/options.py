@@ -186,13 +186,13 @@ class ReadPairs:
         """The options of reading."""
         names = [name for name, _ in self.read]
         if repeated := [name for name in names if names.count(name) > 1]:
-            raise ProgramError(f"--read {repeated[0]}: expected one value, got {names.count(repeated[0])}; give one")
+            raise ProgramError(f"--read {repeated[0]}: expected one value, got {names.count(repeated[0])}", "give one")
         return LoadOptions(**dict(self.read))
 
     def refuse(self, use: str, *names: str) -> None:
         """Refuse options of reading for which a use of the command has no use."""
         if unused := [name for name, _ in self.read if name in names]:
-            raise ProgramError(f"--read {', '.join(unused)}: no effect {use}; leave it out")
+            raise ProgramError(f"--read {', '.join(unused)}: no effect {use}", "leave it out")
 
 
 @Parameter(name="*", group=Group("Options", sort_key=1))
