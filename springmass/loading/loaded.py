@@ -22,6 +22,7 @@ from springmass.loading.track import between, to_track
 from storage.run_file.reading import open_run
 
 UNVERIFIED = "unverified"
+BLOCK_SAMPLES = 1024
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,10 +114,10 @@ class Loaded:
             raise ProgramError(f"{where}: no sample lies between {low:g} and {high:g} s; the record {span}")
         return part
 
-    def samples_in_blocks(self, size: int = 1024) -> Iterator[Block]:
-        """Yield the samples in blocks of at most ``size``."""
-        for start in range(0, len(self.samples), size):
-            yield self.samples[start : start + size]
+    def samples_in_blocks(self) -> Iterator[Block]:
+        """Yield the samples in blocks."""
+        for start in range(0, len(self.samples), BLOCK_SAMPLES):
+            yield self.samples[start : start + BLOCK_SAMPLES]
 
 
 def sha256_of(path: Path) -> str:
