@@ -51,7 +51,7 @@ class SensorChain:
         decoder: object = family.decoder(**(options or {}))
         if not isinstance(decoder, Decoder):
             message = "its decoder must inherit from springmass.extend.Decoder, got"
-            raise SensorError(f"sensor {family.name}: {message} {type(decoder).__name__}; repair the package")
+            raise SensorError(f"sensor {family.name}: {message} {type(decoder).__name__}", "repair the package")
         self.decoder = decoder
         self.timebase = Timebase(family.rate_hz if rate_hz is None else rate_hz)
         if clock_ppm is not None:
