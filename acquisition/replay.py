@@ -12,7 +12,7 @@ import numpy as np
 from acquisition.block import Block, Flag, SourceInfo, concatenate
 from acquisition.clock import Clock
 
-BLOCK_SAMPLES = 16
+READ_SAMPLES = 16
 
 
 class Replay:
@@ -76,8 +76,8 @@ class Replay:
             return
         begin_ns, begin_s = self._clock.now_ns(), float(self._due[first])
         while True:
-            for start in range(first, size, BLOCK_SAMPLES):
-                block = self._run[start : start + BLOCK_SAMPLES]
+            for start in range(first, size, READ_SAMPLES):
+                block = self._run[start : start + READ_SAMPLES]
                 if self._closed:
                     return
                 due_s = float(self._due[start + len(block) - 1]) - begin_s

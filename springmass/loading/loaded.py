@@ -22,7 +22,7 @@ from springmass.loading.track import between, to_track
 from storage.run_file.reading import open_run
 
 UNVERIFIED = "unverified"
-BLOCK_SAMPLES = 1024
+SAMPLES_PER_BLOCK = 1024
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,8 +118,8 @@ class Loaded:
 
     def samples_in_blocks(self) -> Iterator[Block]:
         """Yield the samples in blocks."""
-        for start in range(0, len(self.samples), BLOCK_SAMPLES):
-            yield self.samples[start : start + BLOCK_SAMPLES]
+        for start in range(0, len(self.samples), SAMPLES_PER_BLOCK):
+            yield self.samples[start : start + SAMPLES_PER_BLOCK]
 
 
 def sha256_of(path: Path) -> str:
