@@ -1,4 +1,4 @@
-"""Colours, dashes and markers in charts: data, selected, other and rejected laws, flagged samples, marks, order in time."""
+"""Colours, dashes and markers of data, selected, other and rejected laws, flagged samples, marks and order in time."""
 
 from __future__ import annotations
 
