@@ -17,7 +17,7 @@ from acquisition.decoders.decoder import Decoder, DeviceStatus
 from acquisition.decoders.sensor import Sensor
 from acquisition.errors import SensorError
 from acquisition.live.calibration import Calibration
-from acquisition.live.clock_fit import COUNTER_PPM, ClockSamples, fit_clock
+from acquisition.live.clock_fit import COUNTER_PPM, ClockSamples
 from acquisition.live.timebase import Timebase, demand_within
 from acquisition.readings import NO_READINGS, Reading, Readings, carried
 
@@ -157,7 +157,7 @@ class SensorChain:
                 "kind": self.timebase.clock,
                 "moment": "reflection" if self._at_reflection else "reading",
                 "limit_ppm": self.clock_ppm,
-                **fit_clock(*self._clock.columns()).to_mapping(),
+                **self._clock.fit().to_mapping(),
             },
         }
 

@@ -22,6 +22,7 @@ from springmass.loading.track import between, to_track
 from storage.run_file.reading import open_run
 
 UNVERIFIED = "unverified"
+SAMPLES_PER_BLOCK = 1024
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,10 +116,10 @@ class Loaded:
             raise ProgramError(f"{where}: no sample lies between {low:g} and {high:g} s", f"the record {span}")
         return part
 
-    def samples_in_blocks(self, size: int = 1024) -> Iterator[Block]:
-        """Yield the samples in blocks of at most ``size``."""
-        for start in range(0, len(self.samples), size):
-            yield self.samples[start : start + size]
+    def samples_in_blocks(self) -> Iterator[Block]:
+        """Yield the samples in blocks."""
+        for start in range(0, len(self.samples), SAMPLES_PER_BLOCK):
+            yield self.samples[start : start + SAMPLES_PER_BLOCK]
 
 
 def sha256_of(path: Path) -> str:

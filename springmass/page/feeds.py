@@ -13,7 +13,7 @@ from acquisition.events import Calibrated, RunEnded, StoredEvent, Triggered, Zer
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
 from springmass.loading.loaded import Loaded
-from springmass.page.view import SampleBuffer, View
+from springmass.page.view import SensorSamples, View
 from springmass.report.recorded import event_words
 from storage.errors import NotALog, StorageError
 from storage.schema import plain
@@ -36,10 +36,9 @@ class LogFeed:
         header = self._log.header
         if header is None:
             raise NotALog(path, "expected a wire log with a header, got none", "name the log of a recording")
-        self.scene = header.scene
         self._scan = self._log.scan()
         self._sensors = {sensor.channel: sensor for sensor in header.sensors}
-        self._series: dict[Part, SampleBuffer] = {}
+        self._series: dict[Part, SensorSamples] = {}
         self._shown = [Part(channel, 1) for channel in self._sensors]
         self._timed: list[Record] = []
         self.view = View(
@@ -50,6 +49,7 @@ class LogFeed:
             [f"{sensor.channel}: {sensor.family}" for sensor in header.sensors],
             simulated=header.kind == "simulated",
             calibration=_calibration(header.sensors[0].calibration),
+            scene=header.scene,
             provenance={"sensor": plain(header.sensors[0]), "events": []},
         )
         self._decoder = LogDecoder(self._sensors, self._begin, self._note)
@@ -88,7 +88,7 @@ class LogFeed:
         if part.number == 1:
             self._series[part] = self.view.series[number]
         else:
-            self._series[part] = SampleBuffer()
+            self._series[part] = SensorSamples()
             series = [self._series[shown] for shown in self._shown]
             self.view = replace(self.view, series=series, session=secrets.token_hex(8))
         return chain_of(self._sensors[part.sensor])
@@ -136,8 +136,7 @@ def view_of(loaded: Loaded) -> View:
         loaded.samples.unit,
         loaded.info.clock,
         simulated=loaded.info.kind == "simulated",
-        recorded=loaded.track,
-        traps=loaded.traps,
+        loaded=loaded,
         ended=True,
     )
     view.series[0].push(loaded.samples)
