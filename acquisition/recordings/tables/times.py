@@ -65,7 +65,7 @@ _MOST_MOVED = 3
 _RISING = 0.1  # maximum number of rising steps for each falling one, in rows that come newest first
 
 
-class Clock(NamedTuple):
+class ClockTime(NamedTuple):
     """A time in a cell: the day, a proleptic ordinal or 0 without a clear date, seconds, and the printed decimals."""
 
     day: int
@@ -73,7 +73,7 @@ class Clock(NamedTuple):
     decimals: int
 
 
-def clock_s(cell: str) -> Clock | None:
+def clock_s(cell: str) -> ClockTime | None:
     """Return the time of day in a cell, with the date if its order of day and month is clear; None for other text."""
     match = CLOCK.fullmatch(cell)
     if match is not None:
@@ -98,7 +98,7 @@ def clock_s(cell: str) -> Clock | None:
     return _clock(match, _ordinal(year if year > 99 else 2000 + year, months[0], day), half)
 
 
-def _clock(match: re.Match[str], day: int, half: str) -> Clock:
+def _clock(match: re.Match[str], day: int, half: str) -> ClockTime:
     hour = int(match["h"] or match["h2"] or match["h4"] or 0)
     hour = hour % 12 + 12 * (half == "p") if half else hour
     part = f"{match['ms']:0>3}" if match["ms"] else match["part"] or match["part3"] or match["part4"] or ""
@@ -106,7 +106,7 @@ def _clock(match: re.Match[str], day: int, half: str) -> Clock:
     minutes = int(match["m"] or match["m2"] or match["m3"] or match["m4"])
     if match["h2"] and hour > 23:  # 59:50 is minutes and seconds
         hour, minutes, seconds = 0, hour, float(minutes)
-    return Clock(day, round(hour * 3600 + minutes * 60 + seconds, len(part)), len(part))
+    return ClockTime(day, round(hour * 3600 + minutes * 60 + seconds, len(part)), len(part))
 
 
 @lru_cache(maxsize=64)
