@@ -14,6 +14,7 @@ import numpy as np
 
 from acquisition.errors import FormatError
 from acquisition.line_numbers import UNIT_OF_WORD, Number, find_distance, has_decimal_comma, numbers
+from acquisition.recordings.families.markup import BLANKS
 from acquisition.recordings.tables.format import ColumnFormat
 from acquisition.recordings.tables.headings import Heading, is_time
 from acquisition.recordings.tables.layout import runs_forward
@@ -58,7 +59,8 @@ def _kind(of_line: list[Number]) -> LineForm:
 
 
 def _evidence(head: bytes) -> str:
-    lines = _joined(Text.of(head).head(_HEAD)) if is_text(head) else []
+    markup = head.lstrip(BLANKS).startswith(b"<")
+    lines = _joined(Text.of(head).head(_HEAD)) if is_text(head) and not markup else []
     return "the lines are words with numbers, as a sketch prints them" if _usual(lines) else ""
 
 

@@ -46,7 +46,7 @@ def runs_of(table: Table) -> list[Table]:
         return [_with_times(table, t, remark)]
     if out_of_place(t):
         order = _sorted(t)
-        return [_with_times(_taken(table, order), t[order], "up to three rows were out of place, and were sorted")]
+        return [_with_times(_taken(table, order), t[order], "rows were out of place and were sorted")]
     begins = _begins(t)
     if not begins or median(np.diff([0, *begins, size])) < _FEWEST_ROWS:
         return [table]

@@ -17,7 +17,14 @@ from acquisition.recordings.sampling.timing import median, rate_needed
 from acquisition.recordings.tables.blocks import runs_of
 from acquisition.recordings.tables.headings import BRACKETED, name_and_unit
 from acquisition.recordings.tables.table import Column, Table
-from acquisition.recordings.tables.vocabulary import DERIVED, OSCILLATES, POSITION_WORDS, UNIT_OF_NAME
+from acquisition.recordings.tables.vocabulary import (
+    AUTOCORRELATION,
+    DERIVED,
+    FREQUENCY,
+    OSCILLATES,
+    POSITION_WORDS,
+    UNIT_OF_NAME,
+)
 from acquisition.units import MEASURES, TIMES, Measure, measure_of, time_unit, unit_words
 
 _SLOW_S = 0.999
@@ -64,6 +71,8 @@ def choose_channel(path: str, tables: Sequence[Table], answers: ReadOptions) -> 
         column = next((each for each in table.columns if each.name == column.name), column)
     if table.times is not None and table.lines is not None and _restarts(table.times):
         table = replace(table, times=None, formula=None)  # chunks of times, with unknown intervals between them
+    if no_motion := _no_motion(table, column):
+        raise FormatError(path, f"expected a motion, got {no_motion}", "export the data against time")
     if answers.time_unit is not None:
         table = _with_time_unit(path, table, answers.time_unit)
     needs.extend(_missing_times(path, [each for _, each in channels], table, column, answers))
@@ -110,6 +119,18 @@ def _candidates(channels: Sequence[Channel]) -> Sequence[Channel]:
     fit = [each for each in fit if _varies(_some_of(each[1]))] or fit
     fit = [each for each in fit if each[1].is_length] or fit
     return sorted(fit, key=lambda each: _unlikely(each[1]))
+
+
+def _no_motion(table: Table, column: Column) -> str:
+    """Return what is tabulated if it is no motion: a spectrum or an autocorrelation; empty for a motion."""
+    names = [column.name, table.times.name if table.times is not None else ""]
+    if any(AUTOCORRELATION.search(name) for name in names):
+        return f'the autocorrelation "{" against ".join(filter(None, names))}"'
+    for each in table.beside if not table.is_timed else ():
+        rises = np.diff(_some_of(each))
+        if (FREQUENCY.search(each.name) or each.unit.lower() in ("hz", "khz")) and rises.size and (rises > 0).all():
+            return f'a spectrum against "{each.label}"'
+    return ""
 
 
 def _may_be_a_recording(table: Table) -> bool:

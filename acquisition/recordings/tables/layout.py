@@ -335,7 +335,7 @@ def times_by_name(table: Header, columns: Sequence[F8]) -> list[int]:
 def _may_be_times(column: F8, cells: Sequence[str]) -> bool:
     if runs_forward(column) or is_newest_first(column):
         return True
-    forms = np.array([number_form(cell)[1] for cell in cells[: column.size]], np.int8)
+    forms = np.array([number_form(cell)[1] for cell in cells[: column.size]], np.int8) if cells else None
     steps = np.diff(column[np.isfinite(column)])
     again = steps.size and np.mean(steps < 0) <= _RESTARTS and np.mean(steps > 0) >= 0.5
     return bool(again) or runs_forward(in_order(column, forms)[0])

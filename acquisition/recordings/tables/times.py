@@ -6,7 +6,7 @@ languages (:func:`clock_s`), or a duration (:func:`duration_s`). A column of tim
 1. Fractions are whole numbers of milliseconds without leading zeros: 12.40 is 12.040 s.
 2. Its counter wraps: adding one of :data:`_WRAPS` gives the usual step at every step back.
 3. The rows come newest first.
-4. At most three rows are out of place.
+4. Rows are out of place: sorted, their steps are regular, or at most three are moved.
 5. Another block of rows begins (:mod:`acquisition.recordings.tables.blocks`).
 """
 
@@ -244,13 +244,14 @@ def is_newest_first(t: F8) -> bool:
 
 
 def out_of_place(t: F8) -> bool:
-    """Return whether sorting moves at most three rows, each to a place that was free."""
+    """Return whether sorting gives regular steps, or moves at most three rows, each to a place that was free."""
     finite = t[np.isfinite(t)]
-    moved = np.count_nonzero(finite < np.maximum.accumulate(finite))
-    if not 0 < moved <= _MOST_MOVED:
-        return False
     before, after = np.diff(finite), np.diff(np.sort(finite))
-    usual = median(before[before > 0]) if (before > 0).any() else 0.0
-    return bool(
-        after.min() >= 0.5 * usual and np.count_nonzero(after > 1.5 * usual) <= np.count_nonzero(before > 2.5 * usual)
-    )
+    if not (before < 0).any():
+        return False
+    usual = median(after)
+    if usual > 0 and after.min() >= 0.5 * usual and after.max() <= 1.5 * usual:
+        return True
+    gaps = np.count_nonzero(after > 1.5 * usual) <= np.count_nonzero(before > 2.5 * usual)
+    moved = np.count_nonzero(finite < np.maximum.accumulate(finite))
+    return bool(moved <= _MOST_MOVED and after.min() >= 0.5 * usual and gaps)

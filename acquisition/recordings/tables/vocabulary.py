@@ -90,6 +90,9 @@ UNIT_OF_NAME = (
     (_pattern(r"force|kraft|forza|fuerza"), "N"),
 )
 """What a channel without a unit probably measures: the unit that a question gives as its example."""
+FREQUENCY = _pattern(r"^(freq\w*|frequen[zc]\w*|fréquence|frecuencia|częstotliwość|частота|频率|周波数|f)$")
+AUTOCORRELATION = _pattern(r"auto[-_ ]?[ck]orr|korrelation|\blag\b|time shift|zeitversch")
+"""Names of a frequency, against which spectra are tabulated, and of autocorrelations and their shifts of time."""
 MOTION = words(
     "position velocity acceleration posizione velocità velocita accelerazione ort weg geschwindigkeit beschleunigung "
     "vitesse accélération posición velocidad aceleración 位置 速度 加速度"

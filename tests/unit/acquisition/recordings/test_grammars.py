@@ -333,3 +333,23 @@ def test_an_answer_beats_the_heading(tmp_path: Path) -> None:
     recording = read(tmp_path, text, unit="cm")
     holds(recording)
     assert [each for each in recording.traps if each.code == "unit_given"]
+
+
+# Values
+
+
+TURNS = [("deg", 360.0, "{:.2f}"), ("rad", 2 * np.pi, "{:.5f}"), ("", 65536, "{:.0f}")]
+
+
+@pytest.mark.parametrize(("unit", "turn", "form"), TURNS)
+@pytest.mark.parametrize("low", [0.0, -0.5])
+def test_jumps_by_a_turn_are_undone(tmp_path: Path, unit: str, turn: float, form: str, low: float) -> None:
+    """Angles and counters are written within one turn; the motion goes on beyond it, and this is noted."""
+    true = (low + 0.01 + 0.08 * np.cos(6.0 * T)) * turn
+    cells = [form.format((each - low * turn) % turn + low * turn) for each in true]
+    head = f"Time (s);Angle ({unit})" if unit else "Time (s);AcX"
+    answers = {} if unit else {"unit": "1"}
+    recording = read(tmp_path, table([f"{t:.2f}" for t in T], cells, head=head), **answers)
+    steps = np.diff(true) * (np.pi / 180 if unit == "deg" else 1.0)
+    np.testing.assert_allclose(np.diff(recording.samples.distance), steps, atol=turn * 1e-4)
+    assert [each for each in recording.traps if each.code == "values_unwrapped"]
