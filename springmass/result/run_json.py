@@ -19,6 +19,7 @@ from pipeline.results.budget import Contribution
 from pipeline.results.classic import Classic
 from springmass import __version__
 from springmass.loading.loaded import Loaded
+from springmass.result.grades import grades_json
 
 RESULT_SCHEMA = 3
 EXPANDED = ("dof", "coverage_factor", "expanded")  # of a budget, for its expanded uncertainty
@@ -52,6 +53,7 @@ def result_of(
         "budget": _budgets(analysis) if classic is None else {},
         "correlations": _correlations(analysis, wanted=classic is None),
         "damping": _damping(analysis, wanted=classic is None),
+        "grades": grades_json(analysis) if classic is None else {},
         "effects": analysis.effects,
         "findings": analysis.findings,
         "provenance": provenance_of(accuracy, parameters, time_utc),
