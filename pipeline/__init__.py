@@ -14,5 +14,5 @@ The packages are listed in the order of the data flow; each imports only from th
     checks/         tests of the record against its own model
     results/        estimates with their budgets, effects, curves, comparisons
     findings/       what is reported about a run, in words
-    analyse         runs all stages in order; accuracy has its presets, and streaming runs it during a recording
+    analyse         runs all stages in order; accuracy has its presets
 """
