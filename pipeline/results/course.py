@@ -92,7 +92,7 @@ def agreement(quantity: str, group: str, values: Sequence[Estimate], benches: Se
     [1]_. The variance within benches is the pooled variance of runs about the mean of their bench. The variance between
     benches is the variance of the means less the part from scatter within benches, by the moments of DerSimonian and
     Laird. The uncertainty of a bench's mean uses the larger of the scatter within benches and the stated uncertainty of
-    the runs. That of the common mean is from the scatter of the benches about it, by Hartung and Knapp [2]_, and half of
+    the runs. That of the common mean is from the scatter of the benches about it, by Hartung and Knapp [2]_: half of
     what Student's t expands it to, so that two of it cover the truth however few benches there are. It is never below
     that of benches which do not differ.
 
