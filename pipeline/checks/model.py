@@ -12,7 +12,7 @@ from pipeline.numerics.regression import chi2_quantile
 from pipeline.track import F8
 from pipeline.windows.demodulate import ROUNDING
 
-SHARE = FALSE_ALARM / 3.0  # probability of a false alarm of each of the three tests that decide by one alone
+ALARM_OF_A_TEST = FALSE_ALARM / 3.0  # probability of a false alarm of each of the three tests that decide by one alone
 
 
 def excess(residual: Residual) -> Outcome | None:
@@ -27,7 +27,7 @@ def phases(residual: Residual) -> Outcome | None:
     """Test whether the phases scatter as their noise predicts."""
     phase = residual.fitted.phase
     free = (phase.residual.size - phase.coefficients.size) / phase.correlation
-    if free >= 1.0 and phase.reduced_chi2 > chi2_quantile(1.0 - SHARE, free) / free:
+    if free >= 1.0 and phase.reduced_chi2 > chi2_quantile(1.0 - ALARM_OF_A_TEST, free) / free:
         chi2 = phase.reduced_chi2
         return Outcome("model_misfit", {"phase_chi2": chi2, "phase_scatter": math.sqrt(chi2)})
     return None
@@ -53,7 +53,7 @@ def halves(residual: Residual) -> Outcome | None:
         change = part[-half:] - part[:half]
         level, slope = abs(float(change.sum())) / math.sqrt(half), abs(float(x @ change)) / math.sqrt(float(x @ x))
         apart = max(apart, level / math.sqrt(2.0), slope / math.sqrt(2.0))
-    return Outcome("model_misfit", {"halves": apart}) if apart > normal_quantile(1.0 - SHARE / 4.0) else None
+    return Outcome("model_misfit", {"halves": apart}) if apart > normal_quantile(1.0 - ALARM_OF_A_TEST / 4.0) else None
 
 
 def colour(residual: Residual) -> Outcome | None:
@@ -82,7 +82,7 @@ def colour(residual: Residual) -> Outcome | None:
     enough = pairs > 0.25 * pairs[0]
     correlation = np.where(enough, sums / np.maximum(pairs, 1.0), 0.0) / (sums[0] / pairs[0])
     lag = first + int(np.argmax(np.abs(correlation[first:])))
-    white = normal_quantile(1.0 - SHARE / lags) / math.sqrt(pairs[lag] or 1.0)
+    white = normal_quantile(1.0 - ALARM_OF_A_TEST / lags) / math.sqrt(pairs[lag] or 1.0)
     # With fewer pairs than samples the estimate may exceed 1, which a correlation cannot.
     strongest = max(-1.0, min(float(correlation[lag]), 1.0))
     predictable_m = math.sqrt(abs(strongest) * sums[0] / pairs[0])
