@@ -15,8 +15,7 @@ from springmass.charts.draw import draw, style
 from springmass.charts.run import charts_of
 from springmass.loading.options import AnalysisOptions
 from springmass.simulations import charts
-from springmass.simulations.simulation import simulated
-from springmass.simulations.solving import SimulationOptions
+from springmass.simulations.simulation import SimulationOptions, simulated
 
 HERE = Path(__file__).resolve().parent
 COLUMNS, WIDTH, HEIGHT = 3, 4.2, 3.0

@@ -12,8 +12,7 @@ from pipeline.dynamics.methods import OneStep, acceleration
 from pipeline.errors import DynamicsError
 from springmass.api.analysing import AnyScene
 from springmass.loading.scenes import scene_from
-from springmass.simulations.simulation import simulated
-from springmass.simulations.solving import SimulationOptions
+from springmass.simulations.simulation import SimulationOptions, simulated
 
 if TYPE_CHECKING:
     import xarray as xr

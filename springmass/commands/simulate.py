@@ -21,8 +21,15 @@ from springmass.loading.options import AnalysisOptions
 from springmass.loading.scenes import ask_about, read_scene
 from springmass.runs.run import Run
 from springmass.simulations.against import deviation_text
-from springmass.simulations.simulation import Growth, Simulation, prediction, simulated, summary
-from springmass.simulations.solving import SimulationOptions, UnstableStep
+from springmass.simulations.simulation import (
+    Growth,
+    Simulation,
+    SimulationOptions,
+    UnstableStep,
+    prediction,
+    simulated,
+    summary,
+)
 from springmass.terminal.printing import wrapped
 
 

@@ -54,7 +54,7 @@ def trade(
             )
         motion = motion_of(analysis, analysis.motion)
     elif given_scene is not None:
-        from springmass.simulations.solving import prepare
+        from springmass.simulations.simulation import prepare
 
         ready = prepare(given_scene, seconds, where=str(scene))
         sigma = ready.stated.sensor_sigma_m

@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 
 from acquisition.block import Block
-from acquisition.buffer import SampleBuffer
 from acquisition.clock import Clock
 from acquisition.events import Noted, RunEnded, Triggered, Zeroed
 from acquisition.live.calibration import StillPoint, against_ruler, from_still
@@ -357,8 +356,8 @@ class Session:
         chain, entry = self._chains[channel], self.sensors[0].entry(0)
         return Rolling(
             lambda block: live_run(block, chain.info(entry.port), self._scene, {"sensor": plain(entry)}, LIVE),
-            SampleBuffer(max(int(chain.timebase.rate_hz * SHOWN_S), FEWEST)),
             share=MOTION_SHARE,
+            most=max(int(chain.timebase.rate_hz * SHOWN_S), FEWEST),
             now=lambda: self._clock.now_ns() * 1e-9,
         )
 

@@ -12,7 +12,7 @@ from pipeline.bench.scene import Scene
 from pipeline.dynamics import Trajectory
 from pipeline.dynamics.equation import Problem
 from pipeline.dynamics.strang import STRANG
-from springmass.simulations.solving import prepare
+from springmass.simulations.simulation import prepare
 
 REST_M = 0.25  # height of the bob's rest position above the sensor, m
 STEPS_A_RADIAN = 24  # steps per radian; interpolation between them has an error of 1e-8 of the amplitude

@@ -16,8 +16,7 @@ from pipeline.bench.scene import Scene
 from pipeline.dynamics import Trajectory
 from springmass.loading.save import made_now
 from springmass.simulations.bench import REST_M
-from springmass.simulations.simulation import Simulation, summary
-from springmass.simulations.solving import FINE, count_of, solve
+from springmass.simulations.simulation import FINE, Simulation, count_of, solve, summary
 
 
 def write_readings(path: Path, solved: Simulation, sensor: str, seed: int) -> None:

@@ -13,7 +13,7 @@ from pipeline.bench.disc import derive_drag
 from pipeline.bench.scene import Scene
 from pipeline.dynamics.band import spread
 from pipeline.numerics.estimate import Estimate
-from springmass.simulations.solving import prepare
+from springmass.simulations.simulation import prepare
 from tests.recordings.test_real_runs import RECORDINGS, track_of
 
 ASSUMED_KG = {"bare": Estimate(0.2007, 5e-5, "kg"), "disc": Estimate(0.2176, 5e-5, "kg")}

@@ -14,7 +14,7 @@ import pytest
 from pipeline.bench.scene import Scene
 from pipeline.dynamics import get_integrator
 from pipeline.dynamics.band import draw, spread
-from springmass.simulations.solving import prepare
+from springmass.simulations.simulation import prepare
 
 BENCHES = min(1000, max(200, int(os.environ.get("SPRINGMASS_TRIALS", "200"))))
 TIMES = (10.0, 60.0, 120.0)

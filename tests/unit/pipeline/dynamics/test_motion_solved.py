@@ -13,7 +13,7 @@ from pipeline.bench.spring import oscillating_mass_kg
 from pipeline.dynamics import Equation, Problem, effective_mass_kg, get_integrator
 from pipeline.errors import SceneError
 from springmass.simulations.bench import REST_M, bench_position
-from springmass.simulations.solving import prepare
+from springmass.simulations.simulation import prepare
 
 BENCH = {
     "bob": {"mass_kg": 0.2176},
