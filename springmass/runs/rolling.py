@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,7 +16,9 @@ from acquisition.recordings.recording import Recording
 from pipeline.errors import PipelineError
 from springmass.loading.loaded import Loaded
 from springmass.loading.options import AnalysisOptions
-from springmass.runs.run import Run
+
+if TYPE_CHECKING:
+    from springmass.runs.run import Run
 
 FEWEST = 16
 """Number of samples before the first analysis, a sixth of a second at 100 Hz."""
@@ -46,6 +48,8 @@ def live_run(
     how: AnalysisOptions,
 ) -> Run:
     """Return the samples so far of a recording that is being made, as the run that its log would give."""
+    from springmass.runs.run import Run  # with the first analysis: a recording begins sooner without it
+
     return Run(Loaded(Recording("wire", "", info, "", samples), "wire", scene, provenance), how=how)
 
 

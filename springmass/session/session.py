@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,7 +28,6 @@ from springmass import __version__
 from springmass.errors import SENSOR, ProgramError
 from springmass.loading.options import AnalysisOptions
 from springmass.runs.rolling import FEWEST, NotYet, Rolling, live_run
-from springmass.runs.run import Run
 from springmass.session.failures import Failures, Worker
 from springmass.session.live_state import SECOND_NS, LiveState, Progress, free_bytes, trouble_of
 from springmass.session.reads import Tee
@@ -40,6 +39,9 @@ from storage.recorder import Recorder, RecorderStatus
 from storage.schema import plain
 from storage.wire_log.records import LogHeader
 from storage.wire_log.scanning import LogContents
+
+if TYPE_CHECKING:
+    from springmass.runs.run import Run
 
 HEAR_S = 3.0  # silence before a run after which the sensor counts as absent
 HEARD = 3  # number of readings after which a sensor counts as heard
