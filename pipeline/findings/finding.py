@@ -35,6 +35,8 @@ class Kind:
     advice: tuple[str, ...] = ("",)
     figure: str = ""
     harm: str = "uncertainty"
+    doubts: tuple[str, ...] = ()
+    doubts_above: Mapping[str, float] = field(default_factory=dict)
     about: tuple[str, ...] = ()
     consequence: str | None = None
 
@@ -67,7 +69,7 @@ def kinds() -> Mapping[str, Kind]:
 
 
 def _field(name: str, value: Any) -> Any:
-    if name in ("severity", "says", "details", "advice", "about"):
+    if name in ("severity", "says", "details", "advice", "doubts", "about"):
         return (value,) if isinstance(value, str) else tuple(value)
     return value
 

@@ -37,6 +37,8 @@ class Column:
         Whether it is an auxiliary column (row numbers, an uncertainty), which is read only if the user names it.
     words : (n,) array of str or None
         The text of its cells, if rows are told apart by it.
+    differences : bool
+        Whether each value is the difference from the row before, so that the first may be absent.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Column:
     decimals: I1 | None = None
     aside: bool = False
     words: NDArray[np.str_] | None = None
+    differences: bool = False
 
     @property
     def forms(self) -> I1:
