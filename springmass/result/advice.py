@@ -10,10 +10,9 @@ from typing import Any, Literal, get_args
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.findings.finding import kinds
 from pipeline.numerics.estimate import Estimate, UpperLimit
-from pipeline.numerics.quantity import Unit
+from pipeline.numerics.quantity import Unit, exponents_of
 from pipeline.registry.quantities import INPUTS, QUANTITIES
 from springmass.result.table1 import table_estimates, table_rows
-from springmass.result.values import exponents_of
 from springmass.typeset import typeset
 
 _WORDS = {"error": "Error", "warning": "Warning", "info": "Note"}
