@@ -31,7 +31,8 @@ def to_track(
     The noise stated by a source is passed on. The error column of a file is not noise and is passed on separately.
     """
     facts = provenance or {}
-    of_source = asdict(info)  # but for its name, a track states them under the same names
+    # But for its name, a track states what a source states under the same names.
+    of_source = {**asdict(info), "u_rate": info.u_rate or 0.0}
     del of_source["name"]
     moments = [t_s for t_s, event in recorded_events(facts) if isinstance(event.typed, Triggered)]
     return Track(
@@ -43,7 +44,6 @@ def to_track(
         quantity=samples.quantity,
         unit=samples.unit,
         trigger_s=float(moments[0]) if moments else None,  # when the bob left its rest position
-        u_rate=info.u_rate or 0.0,
         **_clock_comparison(samples, info, facts),
         **_scale(recorded_format, facts.get("sensor") or {}),
     )
