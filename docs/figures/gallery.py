@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from pipeline.bench.scene import Scene
-from pipeline.dynamics import effective_mass_kg
+from pipeline.simulation import effective_mass_kg
 from springmass import Run, sample_data
 from springmass.charts.chart import Chart, Panel
 from springmass.charts.draw import draw, style

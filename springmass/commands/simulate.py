@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from acquisition.errors import visible
-from pipeline.dynamics.band import Band
 from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError
 from pipeline.results.effects import Effect, simulated_effects
+from pipeline.simulation.band import Band
 from springmass.commands.given import GivenOptions
 from springmass.commands.options import FiguresOption, FileArgument, Json, Overwrite, ReadPairs
 from springmass.commands.parameters import Finite, Positive, Whole, flag, option, output

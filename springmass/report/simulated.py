@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pipeline.bench.scene import Scene
-from pipeline.dynamics import effective_mass_kg
-from pipeline.dynamics.band import LEVELS, Band
+from pipeline.simulation import effective_mass_kg
+from pipeline.simulation.band import LEVELS, Band
 from pipeline.track import F8
 from springmass.result.output_names import in_a_name, make_folder
 from springmass.simulations.against import Against

@@ -10,8 +10,8 @@ from typing import Any, Literal, get_args
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.findings.finding import kinds
 from pipeline.numerics.estimate import Estimate, UpperLimit
-from pipeline.numerics.quantity import Unit
-from pipeline.registry.quantities import INPUTS, QUANTITIES
+from pipeline.quantities import INPUTS, QUANTITIES
+from pipeline.units import Unit
 from springmass.result.table1 import table_estimates, table_rows
 from springmass.result.values import exponents_of
 from springmass.typeset import typeset

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.analysis import Analysis
-from pipeline.dynamics import Problem
-from pipeline.dynamics.band import C16, Band
 from pipeline.numerics.estimate import Estimate
-from pipeline.track import F8, UNUSABLE
+from pipeline.simulation import Problem
+from pipeline.simulation.band import Band
+from pipeline.track import C16, F8, UNUSABLE
 from springmass.simulations.from_run import oscillation_of
 from springmass.simulations.simulation import FINE, count_of, solve
 
@@ -84,7 +84,7 @@ def compare_with_run(
     the best-fitting values are sought.
     """
     motion = oscillation_of(analysis)
-    used = analysis.conditioned.used
+    used = analysis.samples.used
     t, measured = analysis.track.t[used], analysis.track.y[used]
     if method == "auto":
         step_s = min(step_s, 1.0 / (FINE * problem.equation.angular_frequency_per_s))
@@ -168,5 +168,5 @@ def deviation_text(against: Against) -> list[str]:
 
 def duration_s(analysis: Analysis) -> float:
     """Return the time from the first to the last used sample, s."""
-    t = analysis.track.t[analysis.conditioned.used]
+    t = analysis.track.t[analysis.samples.used]
     return float(t[-1] - t[0])

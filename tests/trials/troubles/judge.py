@@ -130,4 +130,4 @@ def _beginning(analysis: Analysis) -> float:
     """The moment that amplitude and damping rate are stated for, s."""
     if isinstance(analysis.motion, Oscillation):
         return analysis.motion.phase.t0
-    return float(analysis.track.t[np.flatnonzero(analysis.conditioned.used)[0]])
+    return float(analysis.track.t[np.flatnonzero(analysis.samples.used)[0]])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from pipeline.numerics.quantity import Unit
+from pipeline.units import Unit
 
 
 @dataclass(frozen=True, slots=True)
