@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import unicodedata
-from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from failure import Error
 
@@ -43,14 +42,10 @@ class FormatError(AcquisitionError):
     """
 
     def __init__(self, path: str, problem: str, remedy: str, *, line: int | None = None) -> None:
-        self.path, self.problem, self.remedy, self.line = path, problem, remedy, line
-        where = path if line is None else f"{path}, line {line}"
-        text = f"{problem} {remedy}" if problem.endswith("?") else f"{problem}; {remedy}"
         # Names and units come from the file and may contain line ends. The path comes from the user and is not escaped.
-        super().__init__(f"{where}: {visible(text)}")
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return partial(type(self), self.path, self.problem, self.remedy, line=self.line), (), self.__dict__
+        where = f"{path}: " if line is None else f"{path}, line {line}: "
+        super().__init__(visible(problem), visible(remedy), where=where)
+        self.path, self.line = path, line
 
 
 class UnknownFormat(FormatError):
@@ -72,14 +67,11 @@ class NeedsAnswer(FormatError):
 
     def __init__(self, question: Question, remedy: str = "", *, line: int | None = None) -> None:
         super().__init__(question.path, question.sentence, remedy or question.remedy, line=line)
-        self.question = question
+        self.question, self.between = question, " "
 
     def with_remedy(self, remedy: str) -> NeedsAnswer:
         """Return an error with the same question and another remedy."""
         return NeedsAnswer(self.question, remedy, line=self.line)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return partial(type(self), self.question, self.remedy, line=self.line), (), self.__dict__
 
 
 class SensorError(AcquisitionError):

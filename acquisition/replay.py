@@ -12,6 +12,8 @@ import numpy as np
 from acquisition.block import Block, Flag, SourceInfo, concatenate
 from acquisition.clock import Clock
 
+READ_SAMPLES = 16
+
 
 class Replay:
     """Delivers the samples of a recording in blocks, at the recorded speed or another one.
@@ -25,12 +27,12 @@ class Replay:
     of each repetition has the flag ``GAP_BEFORE``, because ``t`` jumps back there.
 
     >>> from acquisition.clock import VirtualClock
-    >>> t = np.arange(5) / 100
-    >>> run = Block(0, t, 0.2 + t, np.zeros(5, np.uint8))
+    >>> t = np.arange(20) / 100
+    >>> run = Block(0, t, 0.2 + t, np.zeros(20, np.uint8))
     >>> info = SourceInfo("replay", "run", 100.0)
-    >>> with Replay([run], VirtualClock(), info=info, block_samples=2) as source:
+    >>> with Replay([run], VirtualClock(), info=info) as source:
     ...     [len(block) for block in source]
-    [2, 2, 1]
+    [16, 4]
     """
 
     def __init__(
@@ -40,7 +42,6 @@ class Replay:
         *,
         info: SourceInfo,
         speed: float | None = 1.0,
-        block_samples: int = 16,
         from_s: float = -math.inf,
         loop: bool = False,
     ) -> None:
@@ -55,7 +56,6 @@ class Replay:
             self._due = np.zeros(len(self._run))
         self._clock = clock
         self._speed = math.inf if speed is None else float(speed)
-        self._block_samples = block_samples
         self._first = int(np.searchsorted(self._due, from_s))
         self._loop = loop
         self._closed = False
@@ -76,8 +76,8 @@ class Replay:
             return
         begin_ns, begin_s = self._clock.now_ns(), float(self._due[first])
         while True:
-            for start in range(first, size, self._block_samples):
-                block = self._run[start : start + self._block_samples]
+            for start in range(first, size, READ_SAMPLES):
+                block = self._run[start : start + READ_SAMPLES]
                 if self._closed:
                     return
                 due_s = float(self._due[start + len(block) - 1]) - begin_s

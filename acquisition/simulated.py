@@ -138,7 +138,7 @@ class VirtualPort:
         options: Mapping[str, Any] | None = None,
     ) -> None:
         if family.encoder is None or family.poll is not None:
-            raise SensorError(f"sensor {family.name} cannot be simulated; simulate line-protocol")
+            raise SensorError(f"sensor {family.name} cannot be simulated", "simulate line-protocol")
         self._encoder = family.encoder(**(options or {}))
         self._rangefinder = rangefinder
         self._clock = clock

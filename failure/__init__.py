@@ -4,19 +4,30 @@ from __future__ import annotations
 
 
 class Error(ValueError):
-    """Something that the user can change: one line that says where, what is wrong, which value, and what to do.
+    """Something that the user can change; its text is one line with where, what is wrong, which value, what to do.
 
-    ``remedy`` is what to do.
+    Parameters
+    ----------
+    problem : str
+        What is wrong; without a remedy it also says what is expected.
+    remedy : str, optional
+        What to do.
+    where : str, optional
+        The place with the punctuation after it, where ``problem`` does not begin with it.
+    between : str, optional
+        The punctuation before the remedy.
 
     Examples
     --------
-    >>> Error("run.csv: the rate is not stated; add rate_hz=100").remedy
-    'add rate_hz=100'
+    >>> error = Error("run.csv: the rate is not stated", "add rate_hz=100")
+    >>> str(error), error.remedy
+    ('run.csv: the rate is not stated; add rate_hz=100', 'add rate_hz=100')
     """
 
-    remedy: str = ""
+    # ``args`` are what ``__new__`` was given. So a copy, also in another process, is made of these and the attributes.
+    def __init__(self, problem: str, remedy: str = "", /, *, where: str = "", between: str = "; ") -> None:
+        self.problem, self.remedy, self.where, self.between = problem, remedy or problem, where, between
 
-    def __init__(self, message: str = "") -> None:
-        super().__init__(message)
-        if not self.remedy:
-            self.remedy = message.rpartition("; ")[2].rpartition(": ")[2]
+    def __str__(self) -> str:
+        after = "" if self.remedy == self.problem else f"{self.between}{self.remedy}"
+        return f"{self.where}{self.problem}{after}"

@@ -29,8 +29,8 @@ def load_entry(
     except Exception as error:
         reason = " ".join(str(error).split())
         raise refused(
-            f"{what} ({entry.value}): cannot be loaded ({type(error).__name__}: {reason}); "
-            "repair or remove the package that provides it"
+            f"{what} ({entry.value}): cannot be loaded ({type(error).__name__}: {reason})",
+            "repair or remove the package that provides it",
         ) from error
 
 

@@ -80,7 +80,7 @@ def _at_rest(samples: Samples) -> dict[str, Estimate]:
     """Return the mean and the noise of the samples used."""
     y, noise, unit = samples.track.y[samples.used], samples.noise, samples.track.unit
     if not y.size:
-        raise AnalysisError("no usable sample is left; see the counts of flagged samples")
+        raise AnalysisError("no usable sample is left", "see the counts of flagged samples")
     # If the distance steps or creeps, neighbouring samples are correlated: the mean is less certain than n suggests.
     u = float(np.std(y) * np.sqrt(correlation_length(y) / y.size))
     # A sensor with coarse steps gives nearly all distances alike at rest; the few others were flagged as false echoes.

@@ -82,7 +82,7 @@ class Track:
     def __post_init__(self) -> None:
         if UNITS.get(self.quantity) != self.unit:
             known = ", ".join(f"{quantity} in {unit}" for quantity, unit in UNITS.items())
-            raise TrackError(f"a track holds one of {known}, got {self.quantity} in {self.unit}; convert to SI first")
+            raise TrackError(f"a track holds one of {known}, got {self.quantity} in {self.unit}", "convert to SI first")
 
     def __len__(self) -> int:
         return int(self.t.size)
@@ -90,7 +90,7 @@ class Track:
     def demand_length(self, what: str) -> None:
         """Raise an error if the track is no length, which ``what`` needs."""
         if self.quantity != "length":
-            raise TrackError(f"{what} needs a length in m, got {self.quantity} in {self.unit}; leave it out")
+            raise TrackError(f"{what} needs a length in m, got {self.quantity} in {self.unit}", "leave it out")
 
     @classmethod
     def from_arrays(
@@ -125,12 +125,14 @@ class Track:
             steps = steps[np.isfinite(steps) & (steps > 0)]
             if not steps.size:
                 raise TrackError(
-                    "time never increases, so the rate is unknown; give the samples in the order of their times"
+                    "time never increases, so the rate is unknown", "give the samples in the order of their times"
                 )
             rate_hz = float(np.round(1.0 / np.median(steps), 6))
         # An infinite time is as unknown as NaN, but only NaN passes through a cosine without a warning.
         t_s[~np.isfinite(t_s)] = np.nan
         for name, value in (("rate_hz", rate_hz), ("sigma_m", sigma_m), ("quantum_m", quantum_m)):
             if value is not None and not (np.isfinite(value) and value > 0):
-                raise TrackError(f"{name} must be positive and finite, got {value}; leave it out where it is not known")
+                raise TrackError(
+                    f"{name} must be positive and finite, got {value}", "leave it out where it is not known"
+                )
         return cls(t_s, y_m, bits, float(rate_hz), sigma_m, quantum_m, kind=kind, quantity=quantity, unit=unit)

@@ -30,15 +30,13 @@ NO_MEMORY = "there is not enough memory; end other programs, or raise the limit"
 
 
 class ProgramError(Error):
-    """An error for the user: one line that says where, what is wrong, the value and what to do; and an exit code."""
+    """An error for the user, with an exit code."""
 
-    def __init__(self, message: str, exit_code: int = USAGE) -> None:
-        super().__init__(message)
+    def __init__(
+        self, problem: str, remedy: str = "", /, *, where: str = "", between: str = "; ", exit_code: int = USAGE
+    ) -> None:
+        super().__init__(problem, remedy, where=where, between=between)
         self.exit_code = exit_code
-
-    def __reduce__(self) -> tuple[type[ProgramError], tuple[str, int]]:
-        """Return how to rebuild the error in another process that receives it."""
-        return type(self), (str(self), self.exit_code)
 
 
 class _Stderr(logging.Handler):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from typing import Any
 
 from failure import Error
 
@@ -27,12 +26,8 @@ class StorageError(Error):
     separator = ": "
 
     def __init__(self, path: str | os.PathLike[str], problem: str, remedy: str) -> None:
-        self.path, self.problem, self.remedy = os.fspath(path), problem, remedy
-        super().__init__(f"{self.path}{self.separator}{problem}; {remedy}")
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Return the class and arguments that recreate the error in another process."""
-        return type(self), (self.path, self.problem, self.remedy)
+        self.path = os.fspath(path)
+        super().__init__(problem, remedy, where=f"{self.path}{self.separator}")
 
 
 class NotARun(StorageError):

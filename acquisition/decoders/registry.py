@@ -107,5 +107,5 @@ def _checked(name: str, loaded: Any) -> Sensor:
     """Return the loaded family, or the family of the given name if a table of families was loaded."""
     family = loaded.get(name) if isinstance(loaded, dict) else loaded
     if not isinstance(family, Sensor):
-        raise SensorError(f"sensor {name!r}: expected a Sensor, got {type(family).__name__}; repair the package")
+        raise SensorError(f"sensor {name!r}: expected a Sensor, got {type(family).__name__}", "repair the package")
     return family

@@ -35,8 +35,8 @@ class Calibration:
     def __post_init__(self) -> None:
         if not 100.0 < self.speed_of_sound_m_per_s < 2000.0:
             raise CalibrationError(
-                f"the speed of sound must lie between 100 and 2000 m/s, got {self.speed_of_sound_m_per_s:g}; "
-                "use 344 for air at room temperature"
+                f"the speed of sound must lie between 100 and 2000 m/s, got {self.speed_of_sound_m_per_s:g}",
+                "use 344 for air at room temperature",
             )
         for name, (low, high) in RANGES.items():
             if not low <= getattr(self, name) <= high:
@@ -88,8 +88,8 @@ def from_still(distance: F8) -> StillPoint:
     measured = distance[np.isfinite(distance)]
     if measured.size < 10:
         raise CalibrationError(
-            f"a rest position needs at least ten distances, got {measured.size} in {distance.size} readings; "
-            "check that the sensor sees the bob"
+            f"a rest position needs at least ten distances, got {measured.size} in {distance.size} readings",
+            "check that the sensor sees the bob",
         )
     rest_m = float(np.median(measured))
     total = MAD_TO_SIGMA * float(np.median(np.abs(measured - rest_m)))
@@ -97,8 +97,8 @@ def from_still(distance: F8) -> StillPoint:
     steps = MAD_TO_SIGMA * float(np.median(np.abs(np.diff(measured)))) / math.sqrt(2.0)
     if total > max(5.0 * steps, 5e-4):
         raise CalibrationError(
-            f"the bob moves: its positions scatter by {total * 1e3:.2g} mm, but the noise is {steps * 1e3:.2g} mm; "
-            "wait until it hangs still"
+            f"the bob moves: its positions scatter by {total * 1e3:.2g} mm, but the noise is {steps * 1e3:.2g} mm",
+            "wait until it hangs still",
         )
     noise = max(total, steps)
     return StillPoint(rest_m, 1.2533 * noise / math.sqrt(measured.size), noise, int(measured.size))
@@ -115,7 +115,7 @@ def against_ruler(
     base = base or Calibration()
     if not measured or len(measured) != len(known_m):
         raise CalibrationError(
-            f"expected a measurement for each ruler distance, got {len(measured)} for {len(known_m)}; measure again"
+            f"expected a measurement for each ruler distance, got {len(measured)} for {len(known_m)}", "measure again"
         )
     x = np.array([point.rest_m for point in measured])
     y = np.array(known_m)
@@ -127,7 +127,7 @@ def against_ruler(
         return Calibration(base.speed_of_sound_m_per_s, base.scale, base.offset_m + shift, base.u_scale, u_shift)
     (scale, shift), covariance = np.polyfit(x, y, 1, w=1.0 / u, cov="unscaled")
     if abs(scale - 1.0) > 0.1:
-        raise CalibrationError(f"expected a scale within a tenth of 1, got {scale:.3g}; check the unit of the ruler")
+        raise CalibrationError(f"expected a scale within a tenth of 1, got {scale:.3g}", "check the unit of the ruler")
     return Calibration(
         base.speed_of_sound_m_per_s,
         base.scale * float(scale),

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from acquisition.block import F8, I8
+from acquisition.buffer import GrowingColumns
 
 COUNTER_PPM = 100_000.0
 """Maximum rate error of a counter, ppm: a program that waits 10 ms in a loop also needs the time of the ping."""
@@ -61,28 +62,19 @@ class ClockSamples:
 
     def __init__(self) -> None:
         self._step = 1
-        self._t, self._host_ns = np.empty(1024), np.empty(1024, np.int64)
-        self._count = 0
+        self._times = GrowingColumns(float, np.int64)
 
     def take(self, first: int, t: F8, host_ns: I8) -> None:
         """Add the next samples, with the index of the first, their sensor times in s and their host times in ns."""
         chosen = slice(-first % self._step, None, self._step)
-        t, host_ns = t[chosen], host_ns[chosen]
-        before, self._count = self._count, self._count + t.size
-        if self._count > self._t.size:  # doubling the size is ten times faster than extending the arrays at each read
-            room = max(self._count, 2 * self._t.size) - before
-            self._t = np.concatenate([self._t[:before], np.empty(room)])
-            self._host_ns = np.concatenate([self._host_ns[:before], np.empty(room, np.int64)])
-        self._t[before : self._count], self._host_ns[before : self._count] = t, host_ns
-        if self._count > MAX_SAMPLES:
+        self._times.append(t[chosen], host_ns[chosen])
+        if len(self._times) > MAX_SAMPLES:
             self._step *= 2
-            t, host_ns = self.columns()
-            self._t, self._host_ns = t[::2].copy(), host_ns[::2].copy()
-            self._count = self._t.size
+            self._times.keep(slice(None, None, 2))
 
-    def columns(self) -> tuple[F8, I8]:
-        """Return the sensor times in s and the host times in ns."""
-        return self._t[: self._count], self._host_ns[: self._count]
+    def fit(self) -> ClockFit:
+        """Return the comparison of the clocks."""
+        return fit_clock(*self._times[:])
 
 
 def fit_clock(t: F8, host_ns: I8) -> ClockFit:

@@ -17,7 +17,7 @@ from acquisition.decoders.decoder import Decoder, DeviceStatus
 from acquisition.decoders.sensor import Sensor
 from acquisition.errors import SensorError
 from acquisition.live.calibration import Calibration
-from acquisition.live.clock_fit import COUNTER_PPM, ClockSamples, fit_clock
+from acquisition.live.clock_fit import COUNTER_PPM, ClockSamples
 from acquisition.live.timebase import Timebase, demand_within
 from acquisition.readings import NO_READINGS, Reading, Readings, carried
 
@@ -51,7 +51,7 @@ class SensorChain:
         decoder: object = family.decoder(**(options or {}))
         if not isinstance(decoder, Decoder):
             message = "its decoder must inherit from springmass.extend.Decoder, got"
-            raise SensorError(f"sensor {family.name}: {message} {type(decoder).__name__}; repair the package")
+            raise SensorError(f"sensor {family.name}: {message} {type(decoder).__name__}", "repair the package")
         self.decoder = decoder
         self.timebase = Timebase(family.rate_hz if rate_hz is None else rate_hz)
         if clock_ppm is not None:
@@ -157,7 +157,7 @@ class SensorChain:
                 "kind": self.timebase.clock,
                 "moment": "reflection" if self._at_reflection else "reading",
                 "limit_ppm": self.clock_ppm,
-                **fit_clock(*self._clock.columns()).to_mapping(),
+                **self._clock.fit().to_mapping(),
             },
         }
 

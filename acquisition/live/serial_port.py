@@ -54,7 +54,7 @@ class SerialPort:
         try:
             self._open(address)
         except PortError as error:
-            raise PortError(_explain(address, error.__cause__ or error)) from error.__cause__
+            raise _explained(address, error.__cause__ or error) from error.__cause__
         self._device = _devices().get(os.path.realpath(address))
 
     @property
@@ -200,33 +200,33 @@ def _descriptor(port: Any) -> int:
     return descriptor
 
 
-def _explain(address: str, error: BaseException) -> str:
-    """Return a one-line message for an error of pyserial or of the system."""
+def _explained(address: str, error: BaseException) -> PortError:
+    """Return what an error of pyserial or of the system means, and what to do."""
     code = getattr(error, "errno", None)
     text = str(error)
     if code == errno.ENOENT or "FileNotFoundError" in text:
         there = ", ".join(port.device for port in list_ports()) or "none"
-        return f"{address}: no such port; check the cable, or use one of the ports of this computer: {there}"
+        remedy = f"check the cable, or use one of the ports of this computer: {there}"
+        return PortError(f"{address}: no such port", remedy)
     if code in (errno.EACCES, errno.EPERM) or "PermissionError" in text:
-        return f"{address}: no permission to open the port{_group(address)}"
+        owner, remedy = _group(address)
+        return PortError(f"{address}: no permission to open the port{owner}", remedy)
     if code in (errno.EBUSY, errno.EAGAIN):
-        return f"{address}: the port is used by another program; close that program"
-    return f"{address}: cannot be opened ({' '.join(text.split())}); check the address and the cable"
+        return PortError(f"{address}: the port is used by another program", "close that program")
+    return PortError(f"{address}: cannot be opened ({' '.join(text.split())})", "check the address and the cable")
 
 
-def _group(address: str) -> str:
-    """Return how to get access through the group of the port, or through the administrator if that is unsafe."""
+def _group(address: str) -> tuple[str, str]:
+    """Return whose a port is, and how to get access: by its group, or by the administrator if that is unsafe."""
     try:
         import grp
 
         status = os.stat(address)
         name = grp.getgrgid(status.st_gid).gr_name
     except (ImportError, OSError, KeyError):
-        return "; ask the administrator of this computer"
+        return "", "ask the administrator of this computer"
     shared = stat.S_IRGRP | stat.S_IWGRP
     if status.st_gid == 0 or status.st_mode & shared != shared:
-        return (
-            f": it belongs to {name} only; ask the administrator to give it to a group such as dialout "
-            '(udev rule GROUP="dialout", MODE="0660")'
-        )
-    return f": it belongs to the group {name}; join it with `sudo usermod -aG {name} $USER` and log in again"
+        rule = '(udev rule GROUP="dialout", MODE="0660")'
+        return f": it belongs to {name} only", f"ask the administrator to give it to a group such as dialout {rule}"
+    return f": it belongs to the group {name}", f"join it with `sudo usermod -aG {name} $USER` and log in again"

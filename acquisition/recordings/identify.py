@@ -132,7 +132,7 @@ def _loaders() -> dict[str, Callable[[], Format]]:
         for each in import_module("acquisition.recordings.families.user_dialects").dialects():
             if each.name in (*_MODULES, "table", "sketch"):
                 where = folder / f"{each.name}.toml"
-                raise AcquisitionError(f'{where}: expected a new name, got the format "{each.name}"; rename the file')
+                raise AcquisitionError(f'{where}: expected a new name, got the format "{each.name}"', "rename the file")
             loaders[each.name] = partial(cast, Format, each)
     loaders |= {name: partial(_built_in, module) for name, module in _MODULES.items()}
     for name, entry in entry_points_of("springmass.formats").items():

@@ -82,7 +82,7 @@ def disc_rate(scene: Scene, amplitude_m: float, angular_frequency: float) -> tup
     The mean of the drag over a cycle gives :math:`4 \\omega A \\rho C S / (3\\pi\\,2m)`.
     """
     if scene.bob_mass_kg is None or scene.disc_diameter_m is None:
-        raise SceneError("scene: drag is derived for a [bob] mass_kg with a [disc] diameter_m; add both")
+        raise SceneError("scene: drag is derived for a [bob] mass_kg with a [disc] diameter_m", "add both")
     spring = 0.0 if scene.spring_mass_kg is None else scene.spring_mass_kg.value
     mass = oscillating_mass_kg(spring, scene.bob_mass_kg.value + added_mass_kg(scene))
     area, kc = (
@@ -100,7 +100,7 @@ def derive_drag(scene: Scene, amplitude_m: float, seconds: float) -> DerivedDrag
     over the logarithm of the amplitude, from the start to the end, approximate c A^(2/3) by gamma + beta A.
     """
     if scene.bob_mass_kg is None or scene.spring_constant_n_per_m is None or scene.disc_diameter_m is None:
-        raise SceneError("scene: drag is derived for a [bob] mass_kg on a [spring] constant_n_per_m; add both")
+        raise SceneError("scene: drag is derived for a [bob] mass_kg on a [spring] constant_n_per_m", "add both")
     spring = 0.0 if scene.spring_mass_kg is None else scene.spring_mass_kg.value
     mass = oscillating_mass_kg(spring, scene.bob_mass_kg.value + added_mass_kg(scene))
     omega = math.sqrt(scene.spring_constant_n_per_m.value / mass)

@@ -55,11 +55,11 @@ class Instrument:
         for name, u in (("u_scale", track.u_scale), ("u_offset_m", track.u_offset_m)):
             if not (math.isfinite(u) and u >= 0):
                 raise TrackError(
-                    f"{name} must be finite and not negative, got {u:g}; leave it out where it is not known"
+                    f"{name} must be finite and not negative, got {u:g}", "leave it out where it is not known"
                 )
         for name, limit in (("clock_limit", track.clock_limit), ("compared_s", track.compared_s)):
             if limit is not None and not (math.isfinite(limit) and limit >= 0):
-                raise TrackError(f"{name} must be finite and not negative, got {limit:g}; leave it out")
+                raise TrackError(f"{name} must be finite and not negative, got {limit:g}", "leave it out")
         rate, words, refused = _rate(track)
         sound, sonic = track.speed_of_sound_m_per_s, track.sonic or track.speed_of_sound_m_per_s is not None
         return cls(
@@ -83,8 +83,8 @@ def _rate(track: Track) -> tuple[Estimate, str, bool]:
     rate, u = track.rate_error, track.u_rate_error
     if u is None or not (math.isfinite(rate) and math.isfinite(u) and u >= 0):
         raise TrackError(
-            f"a rate error needs a finite value and an uncertainty that is not negative, got {rate} and "
-            f"{u}; leave both out where the clocks were not compared"
+            f"a rate error needs a finite value and an uncertainty that is not negative, got {rate} and {u}",
+            "leave both out where the clocks were not compared",
         )
     text = f"the device's clock runs {rate * 1e6:+.0f} ppm against the host's (u {u * 1e6:.0f} ppm)"
     if abs(rate) > limit:

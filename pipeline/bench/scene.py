@@ -147,16 +147,16 @@ class Scene:
             allowed = [key for name, key in (*_QUANTITIES, *_CHOICES) if name == table]
             if not allowed:
                 names = ", ".join(dict.fromkeys(name for name, _ in _QUANTITIES))
-                raise SceneError(f"{where}: unknown table [{_short(table)[1:-1]}]; allowed are {names}")
+                raise SceneError(f"{where}: unknown table [{_short(table)[1:-1]}]", f"allowed are {names}")
             if not isinstance(content, Mapping):
                 raise SceneError(
-                    f"{where}: {table} must be a table, got {_short(content)}; write [{table}] above its keys"
+                    f"{where}: {table} must be a table, got {_short(content)}", f"write [{table}] above its keys"
                 )
             for key, value in content.items():
                 if key not in allowed:
                     raise SceneError(
-                        f"{where}: unknown key {_short(key)} in [{table}] (value {_short(value)}); "
-                        f"allowed are {', '.join(allowed)}"
+                        f"{where}: unknown key {_short(key)} in [{table}] (value {_short(value)})",
+                        f"allowed are {', '.join(allowed)}",
                     )
                 if (table, key) in _CHOICES:
                     attribute, texts = _CHOICES[table, key]
@@ -212,8 +212,8 @@ def _check_vapour(scene: Scene, where: str) -> None:
     if vapour_pa > pascal.value:
         raise SceneError(
             f"{where}: [air] relative_humidity {humidity.value:g} at temperature_c {celsius.value:g} must leave "
-            f"a vapour pressure of at most pressure_pa {pascal.value:g}, got {vapour_pa:.3g} Pa; "
-            "one of the three is wrong"
+            f"a vapour pressure of at most pressure_pa {pascal.value:g}, got {vapour_pa:.3g} Pa",
+            "one of the three is wrong",
         )
 
 

@@ -161,7 +161,7 @@ def _fit_laws(points: _Points, t0: float, wanted: Sequence[str | Law], known: La
         points = replace(points, spread=closer, found={})
         fits, unfitted = _weighed(laws, points, unit)
     if not fits:
-        raise AnalysisError("no damping law could be fitted to the amplitudes; see the counts of flagged samples")
+        raise AnalysisError("no damping law could be fitted to the amplitudes", "see the counts of flagged samples")
     fits = _with_growth(fits)
     stated = "" if known is None else known.name
     selected, admissible = select_law(fits, stated, float(points.t[-1]))

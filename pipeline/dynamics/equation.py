@@ -158,7 +158,8 @@ class Problem:
         if not (y < 1.0 and v * v + y * y * (1.0 - 0.5 * y * y) < 0.5):
             raise DynamicsError(
                 f"a softening spring holds its bob within {reach:g} m of rest, the start at {self.displacement_m:g} m "
-                "is too far or too fast; start nearer, or take a smaller cubic term"
+                "is too far or too fast",
+                "start nearer, or take a smaller cubic term",
             )
 
     def amplitude_m(self) -> float:
@@ -180,7 +181,7 @@ class Problem:
         }
         missing = [name for name, value in needed.items() if value is None]
         if missing:
-            raise SceneError(f"{where}: a simulation needs {', '.join(missing)}; add it to the scene")
+            raise SceneError(f"{where}: a simulation needs {', '.join(missing)}", "add it to the scene")
         mass = effective_mass_kg(scene)
         try:
             equation = Equation.from_laws(
@@ -192,13 +193,13 @@ class Problem:
             )
             return cls(equation, _value(scene.start_displacement_m), _value(scene.start_velocity_m_per_s))
         except DynamicsError as error:
-            raise DynamicsError(f"{where}: {error}") from error
+            raise DynamicsError(error.problem, error.remedy, where=f"{where}: ") from error
 
 
 def effective_mass_kg(scene: Scene) -> float:
     """Return the oscillating mass in kg: the bob, the spring's share, and the air that the disc carries along."""
     if scene.bob_mass_kg is None:
-        raise SceneError("scene: a mass that oscillates needs [bob] mass_kg; add it to the scene")
+        raise SceneError("scene: a mass that oscillates needs [bob] mass_kg", "add it to the scene")
     return oscillating_mass_kg(_value(scene.spring_mass_kg), scene.bob_mass_kg.value + added_mass_kg(scene))
 
 

@@ -65,16 +65,16 @@ class Integrator(ABC):
             )
         why = self.refusal(problem)
         if why:
-            raise DynamicsError(f"{self.name} cannot solve this: {why}")
+            raise DynamicsError(f"{self.name} cannot solve this: {why}", "take strang or auto")
         ran_away, remedy = f"{self.name} ran beyond the range of numbers", "take a shorter step, or auto"
         with np.errstate(all="ignore"):
             try:
                 y, v = self.march(problem, step_s, steps, every)
             except (OverflowError, ZeroDivisionError) as error:
-                raise DynamicsError(f"{ran_away} ({error}); {remedy}") from error
+                raise DynamicsError(f"{ran_away} ({error})", remedy) from error
         fine = (np.abs(y) < RANAWAY) & (np.abs(v) < RANAWAY)
         if not fine.all():
-            raise DynamicsError(f"{ran_away} by t = {step_s * every * int(np.argmin(fine)):g} s; {remedy}")
+            raise DynamicsError(f"{ran_away} by t = {step_s * every * int(np.argmin(fine)):g} s", remedy)
         return Trajectory(problem, step_s * every, y, v)
 
 

@@ -63,7 +63,7 @@ class Exact(Integrator):
         """Return the reason for refusal if any force other than spring and viscous drag acts; empty otherwise."""
         if problem.equation.is_linear:
             return ""
-        return "it knows spring and viscous drag only, this scene has more; take strang or auto"
+        return "it knows spring and viscous drag only, this scene has more"
 
     def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
         """Evaluate the solution at every kept time."""
@@ -107,7 +107,7 @@ class Strang(Integrator):
         radians = eq.angular_frequency_per_s * step_s
         if radians * steps > MOST_STEPS:
             raise DynamicsError(
-                f"strang with friction turns by {radians * steps:.3g} radians; take a shorter step or run"
+                f"strang with friction turns by {radians * steps:.3g} radians", "take a shorter step or run"
             )
         parts = max(1, math.ceil(radians))  # so that a step contains at most one turning point
         return kept(problem, _rubbing(problem, step_s / parts, every * parts), steps // every)

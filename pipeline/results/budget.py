@@ -93,7 +93,7 @@ class Inputs:
         self._register(name, kind, dof)
         if not (math.isfinite(estimate.u) and estimate.u >= 0):
             raise AnalysisError(
-                f"{name}: a standard uncertainty must be finite and not negative, got {estimate.u:g}; check the input"
+                f"{name}: a standard uncertainty must be finite and not negative, got {estimate.u:g}", "check the input"
             )
         self._single[name] = estimate
         return ufloat(estimate.value, estimate.u, name) if estimate.u > 0 else estimate.value

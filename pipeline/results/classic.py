@@ -69,7 +69,9 @@ def classic(track: Track, scene: Scene | None = None) -> Classic:
     there = np.isfinite(track.y) & np.isfinite(track.t) & ((track.flags & UNUSABLE) == 0)
     t, y = track.t[there], track.y[there]
     if t.size < 2:
-        raise AnalysisError(f"the classic method needs distances, got {t.size} of {len(track)} samples; record longer")
+        raise AnalysisError(
+            f"the classic method needs distances, got {t.size} of {len(track)} samples", "record longer"
+        )
     crests = _crests(t, y)
     period = Estimate(float(t[crests[-1]] - t[crests[0]]) / CYCLES, READING_S / CYCLES, "s")
     window_t, window_amplitude = sliding_amplitude(t, y, WINDOW_S)
@@ -114,8 +116,8 @@ def sliding_amplitude(t: F8, y: F8, window_s: float) -> tuple[F8, F8]:
     width = round(window_s / step) + 1
     if width > y.size:
         raise AnalysisError(
-            f"the classic method slides a window of {window_s:g} s, the record lasts {t[-1] - t[0]:.3g} s; "
-            "record longer"
+            f"the classic method slides a window of {window_s:g} s, the record lasts {t[-1] - t[0]:.3g} s",
+            "record longer",
         )
     count = y.size - width + 1
     # The window of a filter is centred on its sample: the first whole window on sample width // 2.
@@ -140,7 +142,7 @@ def _crests(t: F8, y: F8) -> list[int]:
                 crests.append(crest)
     if len(crests) <= CYCLES:
         raise AnalysisError(
-            f"the classic method needs {CYCLES + 1} maxima, the record shows {len(crests)}; record longer"
+            f"the classic method needs {CYCLES + 1} maxima, the record shows {len(crests)}", "record longer"
         )
     return crests[: CYCLES + 1]
 

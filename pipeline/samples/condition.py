@@ -114,7 +114,8 @@ def condition(track: Track) -> Samples:
         why = ", ".join(f"{count} {flag.name.lower()}" for flag, count in flagged.items() if count and flag.name)
         raise AnalysisError(
             f"an analysis needs eight usable samples at least, got {np.count_nonzero(clean)} of {len(track)}"
-            f"{f' (flagged: {why})' if why else ''}; record longer, or see to those flagged"
+            f"{f' (flagged: {why})' if why else ''}",
+            "record longer, or see to those flagged",
         )
     y, rows = track.y[clean], np.flatnonzero(clean)
     half_step = 0.5 * (track.quantum_m or 0.0)

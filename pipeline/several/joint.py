@@ -68,7 +68,7 @@ def join(runs: Sequence[tuple[str, Damping, float]]) -> JointDamping:
         raise AnalysisError(f"a joint fit needs two runs at least, got {len(runs)}")
     shared = [name for name in runs[0][1].fits if all(name in damping.fits for _, damping, _ in runs)]
     if not shared:
-        raise AnalysisError("no damping law was fitted to every run; compare runs of the same bob")
+        raise AnalysisError("no damping law was fitted to every run", "compare runs of the same bob")
     last_s = [seconds for _, _, seconds in runs]
     fits = {name: _joined([damping.fits[name] for _, damping, _ in runs], last_s) for name in shared}
 

@@ -85,13 +85,13 @@ class Hooke:
 def hooke(mass_kg: F8, position_m: F8) -> Hooke:
     """Fit a line to rest positions; its u comes from their scatter, and from that of g, 9.81(2) m/s^2."""
     if len(mass_kg) < 3 or np.ptp(mass_kg) <= 0.0:
-        raise AnalysisError(f"Hooke's law needs three masses at least, got {len(np.unique(mass_kg))}; hang on more")
+        raise AnalysisError(f"Hooke's law needs three masses at least, got {len(np.unique(mass_kg))}", "hang on more")
     design = np.column_stack([np.ones_like(mass_kg), mass_kg - mass_kg.mean()])
     (middle, slope), *_ = np.linalg.lstsq(design, position_m, rcond=None)
     line = design @ np.array([middle, slope])
     u_slope = math.sqrt(float(np.sum((position_m - line) ** 2)) / (len(mass_kg) - 2) / float(np.sum(design[:, 1] ** 2)))
     if abs(slope) <= SIGNIFICANT * u_slope:
-        raise AnalysisError("the positions do not follow the masses; check the columns of the table")
+        raise AnalysisError("the positions do not follow the masses", "check the columns of the table")
     k = GRAVITY.value / abs(slope)
     return Hooke(
         Estimate(k, k * math.hypot(u_slope / slope, GRAVITY.u / GRAVITY.value), "N/m"), mass_kg, position_m, line

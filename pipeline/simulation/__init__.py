@@ -45,7 +45,7 @@ def get_integrator(name: str) -> Integrator:
     if name in INTEGRATORS:
         return INTEGRATORS[name]
     if name not in _names():
-        raise DynamicsError(f"unknown method {name!r}; allowed are auto, {', '.join(_names())}")
+        raise DynamicsError(f"unknown method {name!r}", f"allowed are auto, {', '.join(_names())}")
     found: Integrator = load_named(_GROUP, name, Integrator, DynamicsError)
     return found
 

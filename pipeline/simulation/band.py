@@ -123,7 +123,8 @@ def _member(scene: Scene, joint: Joint, measured: Joint | None, values: list[flo
     for name, value, unit in zip(joint.names, values, joint.units, strict=True):
         if name in POSITIVE and value <= 0.0:
             raise DynamicsError(
-                f"the uncertainty of {name}, {joint[name]}, reaches down to 0, where nothing moves; give a smaller one"
+                f"the uncertainty of {name}, {joint[name]}, reaches down to 0, where nothing moves",
+                "give a smaller one",
             )
         drawn[name] = Estimate(value if name in SIGNED else max(value, 0.0), 0.0, unit)
     member = replace(scene, **drawn)
@@ -145,7 +146,7 @@ def spread(
     step_s = RADIANS / ensemble[0].equation.angular_frequency_per_s
     steps = max(1, math.ceil(seconds / step_s))
     if steps > MOST_STATES:
-        raise DynamicsError(f"a band of {seconds:g} s is too long; ask for at most {MOST_STATES * step_s:.3g} s")
+        raise DynamicsError(f"a band of {seconds:g} s is too long", f"ask for at most {MOST_STATES * step_s:.3g} s")
     t = step_s * np.arange(steps + 1.0)
     parts = [_quantiles(*stretch, members) for stretch in _motions(ensemble, t)]
     middle, of_log, displacement, amplitude, phase = (

@@ -90,8 +90,9 @@ def halved(
     """
     demand_times(spacing_s, spacing_s * count)
     refused = f"{integrator.name} cannot keep a tolerance of {tolerance:.3g} here"
-    why = integrator.refusal(problem) or integrator.no_estimate(problem)
-    if why:
+    if why := integrator.refusal(problem):
+        raise DynamicsError(f"{refused}: {why}", "take strang or auto")
+    if why := integrator.no_estimate(problem):
         raise DynamicsError(f"{refused}: {why}")
     rounding = rounding_error(problem, spacing_s * count)
     if integrator is EXACT:
@@ -115,7 +116,7 @@ def halved(
                 refused += ": it needs too many steps"
                 break
         coarse = fine
-    raise DynamicsError(f"{refused}; take a larger tolerance or a shorter run")
+    raise DynamicsError(refused, "take a larger tolerance or a shorter run")
 
 
 def solved_once(

@@ -181,7 +181,7 @@ class SolveIvp(Integrator):
     def refusal(self, problem: Problem) -> str:
         """Return the reason for refusal if there is friction; empty otherwise."""
         if problem.equation.friction_m_per_s2:
-            return "it does not locate the turning points at which friction may hold the bob; take strang or auto"
+            return "it does not locate the turning points at which friction may hold the bob"
         return ""
 
     def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
@@ -193,7 +193,7 @@ class SolveIvp(Integrator):
 
         def right_side(t: float, state: F8) -> tuple[float, float]:
             if next(calls) > MOST_CALLS:
-                raise DynamicsError(f"{self.name} gave up at t = {t:g} s: too stiff or too long; take strang or auto")
+                raise DynamicsError(f"{self.name} gave up at t = {t:g} s: too stiff or too long", "take strang or auto")
             y, v = float(state[0]), float(state[1])
             return v, pull(y, v)
 
@@ -206,9 +206,9 @@ class SolveIvp(Integrator):
         except PipelineError:
             raise
         except ValueError as error:  # raised by scipy on overflow
-            raise DynamicsError(f"{self.name} gave up: {error}; take strang or auto") from error
+            raise DynamicsError(f"{self.name} gave up: {error}", "take strang or auto") from error
         if done.status < 0:
-            raise DynamicsError(f"{self.name} gave up: {done.message}; take strang or auto")
+            raise DynamicsError(f"{self.name} gave up: {done.message}", "take strang or auto")
         return done.y[0], done.y[1]
 
 

@@ -236,7 +236,7 @@ def _finish(samples: Samples, windows: WindowSamples, solution: WindowFits, tuni
     good, weights = solution.good, solution.weights
     if not good.any():
         raise AnalysisError(
-            "no period of the record holds enough usable samples for a fit; see the counts of flagged samples"
+            "no period of the record holds enough usable samples for a fit", "see the counts of flagged samples"
         )
     counts = (weights > 0).sum(axis=1)
     squares = np.sum(weights * solution.residual**2, axis=1)

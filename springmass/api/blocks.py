@@ -120,7 +120,7 @@ def source(
     address = os.fspath(what)
     if not re.fullmatch(r"/dev/.*|.*://.*|COM\d+", address, re.IGNORECASE | re.DOTALL):
         ports = 'a port is named like "/dev/ttyUSB0", "COM3" or "socket://HOST:PORT"'
-        raise ProgramError(f"{address}: there is no such file; check the name, {ports}", UNREADABLE)
+        raise ProgramError(f"{address}: there is no such file", f"check the name, {ports}", exit_code=UNREADABLE)
     _refuse(address, how if speed == 1.0 else {"speed": speed, **how})
     return _Live(address, sensor, baud, scene_from(scene))
 
@@ -128,7 +128,7 @@ def source(
 def _refuse(what: str, given: Mapping[str, Any]) -> None:
     """Refuse options that would have no effect on a source."""
     if unused := [name for name, value in given.items() if value is not None]:
-        raise ProgramError(f"{what}: {', '.join(unused)} would have no effect on this source; leave that out")
+        raise ProgramError(f"{what}: {', '.join(unused)} would have no effect on this source", "leave that out")
 
 
 def _clock(speed: float) -> Clock:
@@ -202,7 +202,7 @@ class _Live:
         self._recorder = self._session.preview(self._path.with_suffix(".wire"))
         if self._recorder is None:
             why = "; ".join(self._session.failures.describe())
-            raise ProgramError(f"{path}: the recording cannot begin ({why}); choose another folder")
+            raise ProgramError(f"{path}: the recording cannot begin ({why})", "choose another folder")
 
     def __enter__(self) -> Self:
         self._session.listen()

@@ -69,7 +69,7 @@ def _row(source: Any, *, scene: Scene | None, how: AnalysisOptions) -> dict[str,
     (run,) = analyse_all([Task(source, path, scene, how)])
     if isinstance(run, Run):
         return row | row_of(run, path)
-    message = run.message
+    message = str(run.error)
     if (asked := run.question) is not None:
         message = str(asked.with_remedy(for_python(asked.question, "springmass.analyse", how.given())))
     return row | {"error": " ".join(message.split())}

@@ -63,10 +63,10 @@ def simulate(
     times = np.asarray(t, np.float64)
     spacing_s = float(times[1]) if times.ndim == 1 and times.size > 1 else 0.0
     if spacing_s <= 0.0 or not np.allclose(times, spacing_s * np.arange(times.size), rtol=1e-9, atol=1e-9 * spacing_s):
-        raise DynamicsError("simulate takes equally spaced times from 0 on; give np.arange(0, SECONDS, STEP)")
+        raise DynamicsError("simulate takes equally spaced times from 0 on", "give np.arange(0, SECONDS, STEP)")
     given_scene, seconds = scene_from(scene), float(times[-1])
     if given_scene is None:
-        raise DynamicsError("simulate takes a scene, got None; give a Scene, its tables or the path of its file")
+        raise DynamicsError("simulate takes a scene, got None", "give a Scene, its tables or the path of its file")
     ready = prepare(given_scene, seconds)
     band, _ = band_of(ready, seconds)
     integrator: str | Integrator = method if isinstance(method, str) else _own(method)
@@ -75,7 +75,7 @@ def simulate(
     if isinstance(method, str):
         wrong, _ = instability(ready.problem, method, spacing_s if tolerance is None else None)
         if wrong:
-            raise DynamicsError(f'{wrong}; give times with a smaller step, a tolerance, or method="strang"')
+            raise DynamicsError(wrong, 'give times with a smaller step, a tolerance, or method="strang"')
     solution = solve(ready.problem, integrator, spacing_s, times.size - 1, tolerance)
     around = np.zeros((4, times.size)) if band is None else band.displacement_at(times)
     of = {"displacement": solution.trajectory.y, "u_displacement": 0.5 * (around[2] - around[1])}

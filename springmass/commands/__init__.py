@@ -99,7 +99,7 @@ def _begin(
 ) -> int:
     LOG.setLevel(logging.WARNING if quiet else logging.DEBUG if verbose else logging.INFO)
     if not words:
-        raise ProgramError("no command; try springmass demo or springmass --help")
+        raise ProgramError("no command", "try springmass demo or springmass --help")
     end = words.index("--") if "--" in words else len(words)
     named = [STDIN if word == "-" else word for word in words[:end]]
     line = [*named, *words[end:]]

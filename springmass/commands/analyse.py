@@ -84,10 +84,10 @@ def analyse(
     """Analyse every input; if one fails, the others still give results."""
     inputs, how = [str(each) for each in recordings], analysis.of(read, options.method)
     if options.keep and (not read.about_the_file().given() or STDIN in inputs):
-        raise ProgramError("--keep keeps options of reading such as --unit next to a file; give one, and the file")
+        raise ProgramError("--keep keeps options of reading such as --unit next to a file", "give one, and the file")
     if how.velocity is not None and (len(inputs) > 1 or Path(inputs[0]).is_dir()):
         got = f"{len(inputs)} inputs" if len(inputs) > 1 else "a folder"
-        raise ProgramError(f"--velocity completes one position file, got {got}; analyse the pair by itself")
+        raise ProgramError(f"--velocity completes one position file, got {got}", "analyse the pair by itself")
     scenes, values = read_scenes(options.scene, len(inputs)), bench.values()
     files, folders = files_of(inputs)
     for line in folders:
@@ -162,13 +162,13 @@ def _keep(runs: Sequence[Run], read: LoadOptions, options: AnalyseOptions) -> No
 
 def _failed(failed: Failed) -> int:
     """Say why a recording gives no run; the remedy of a question names the command for this recording alone."""
-    task, message = failed.task, failed.message
+    task, message = failed.task, str(failed.error)
     if failed.question is not None:
         path = f"./{task.source}" if task.source.startswith("-") else task.source
         words = ["springmass", "analyse", path, *option_words(task.how.given())]
         message = str(failed.question.with_remedy(for_command(failed.question.question, words)))
     LOG.warning(message)
-    return failed.code
+    return failed.error.exit_code
 
 
 def _judged(run: Run, options: AnalyseOptions) -> int:

@@ -64,9 +64,9 @@ def batch(
         print(visible_lines(table) if sys.stdout.isatty() else table.removesuffix("\n"))
         return OK
     if options.output is None:
-        raise ProgramError("batch needs a folder for the results; name it with -o DIR")
+        raise ProgramError("batch needs a folder for the results", "name it with -o DIR")
     if options.dask is not None and options.jobs:
-        raise ProgramError("--dask brings its workers, got --jobs too; leave out --jobs")
+        raise ProgramError("--dask brings its workers, got --jobs too", "leave out --jobs")
     folder = make_folder(options.output)
     with opened(folder) as store:
         course = plan(

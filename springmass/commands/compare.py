@@ -79,7 +79,9 @@ def compare(
         given.only("on courses, which are analysed already", "--json", "--strict")
         return _run_courses(inputs, options)
     if len(inputs) < 2:
-        raise ProgramError(f"compare needs two runs at least, got {len(inputs)}; springmass analyse takes a single one")
+        raise ProgramError(
+            f"compare needs two runs at least, got {len(inputs)}", "springmass analyse takes a single one"
+        )
     if options.output is None:
         given.refuse("without -o", "--figures")
     # Scenes are read first, so that their errors are found before an hour of recordings is read.

@@ -37,7 +37,7 @@ def convert(
 ) -> int:
     """Convert one input."""
     if output is not None and target is not None:
-        raise ProgramError(f"convert writes one output, got {target} and -o {output}; name it once")
+        raise ProgramError(f"convert writes one output, got {target} and -o {output}", "name it once")
     if (output := target or output) is None:
         raise ProgramError(f"OUT is missing: convert {recording} to what? its suffix says the form")
     if Path(output).suffix.lower() not in RUN_SUFFIXES:
@@ -70,13 +70,13 @@ def _write_form(loaded: Loaded, out: Path, *, overwrite: bool) -> int:
     writer = WRITERS.get(out.suffix.lower())
     if writer is None:
         raise ProgramError(
-            f"{out}: the suffix says what to write, one of {', '.join((*RUN_SUFFIXES, *WRITERS))}; "
-            f"got {out.suffix or 'no suffix'}"
+            f"{out}: the suffix says what to write, one of {', '.join((*RUN_SUFFIXES, *WRITERS))}",
+            f"got {out.suffix or 'no suffix'}",
         )
     if loaded.samples.quantity != "length":
         raise ProgramError(
-            f"{out}: this form holds a length in m, got {loaded.samples.quantity} in {loaded.samples.unit}; "
-            f"write a run file, one of {', '.join(RUN_SUFFIXES)}"
+            f"{out}: this form holds a length in m, got {loaded.samples.quantity} in {loaded.samples.unit}",
+            f"write a run file, one of {', '.join(RUN_SUFFIXES)}",
         )
     start_time = str(loaded.provenance.get("start_time", ""))
     written = writer(str(loaded.path), loaded.samples, loaded.info, loaded.title, start_time)
@@ -95,12 +95,14 @@ def _demand_free(targets: Sequence[Path], overwrite: bool) -> None:
     """Check before the work, so that of a pair either both files are written or none."""
     for target in () if overwrite else targets:
         if target.exists():
-            raise ProgramError(f"{target}: the file exists already; choose another place or add --overwrite")
+            raise ProgramError(f"{target}: the file exists already", "choose another place or add --overwrite")
 
 
 def _give_back(loaded: Loaded, out: Path, overwrite: bool) -> list[Path]:
     if not loaded.originals:
-        raise ProgramError(f"{loaded.path}: no original file travels inside this run; nothing to give back", UNREADABLE)
+        raise ProgramError(
+            f"{loaded.path}: no original file travels inside this run", "nothing to give back", exit_code=UNREADABLE
+        )
     if out.is_dir():
         # Names are external input, so only their last part is used for the path.
         inside = [PurePath(each.name) for each in loaded.originals]
@@ -110,7 +112,9 @@ def _give_back(loaded: Loaded, out: Path, overwrite: bool) -> list[Path]:
         targets = [out]
     else:
         names = ", ".join(o.name for o in loaded.originals)
-        raise ProgramError(f"{out}: {len(loaded.originals)} originals travel inside ({names}); name an existing folder")
+        raise ProgramError(
+            f"{out}: {len(loaded.originals)} originals travel inside ({names})", "name an existing folder"
+        )
     _demand_free(targets, overwrite)
     return [
         write_whole(target, original.data, overwrite=overwrite)

@@ -30,7 +30,7 @@ def explain(
         if code not in all_kinds:
             near = get_close_matches(code, all_kinds, n=1)
             hint = f"did you mean {near[0]}?" if near else "springmass explain lists all codes"
-            raise ProgramError(f"there is no finding {code!r}; {hint}")
+            raise ProgramError(f"there is no finding {code!r}", hint)
     if as_json:
         print(json.dumps([_fields(code, all_kinds[code]) for code in codes or all_kinds]))
     elif codes:

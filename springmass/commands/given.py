@@ -29,7 +29,7 @@ class Given:
     def refuse(self, use: str, *names: str) -> None:
         """Refuse options for which a use of the command has no use."""
         if unused := [name for name in self.options if name in names]:
-            raise ProgramError(f"{', '.join(unused)}: no effect {use}; leave it out")
+            raise ProgramError(f"{', '.join(unused)}: no effect {use}", "leave it out")
 
     def only(self, use: str, *names: str) -> None:
         """Refuse all options but those for which a use of the command has a use."""

@@ -205,4 +205,4 @@ class AnalysisArguments:
 def refuse(command: str, read: LoadOptions, *names: str) -> None:
     """Refuse options of reading that mean nothing to a command."""
     if given := [name for name in read.given() if name in names]:
-        raise ProgramError(f"{', '.join(given)}: {command} has no use for it; leave it out")
+        raise ProgramError(f"{', '.join(given)}: {command} has no use for it", "leave it out")

@@ -75,7 +75,7 @@ def page(
         LOG.info("the page is closed")
     except OSError as error:
         reason = error.strerror or str(error)
-        raise ProgramError(f"--page-port {page.page_port}: {reason}; name another, or 0 for any") from error
+        raise ProgramError(f"--page-port {page.page_port}: {reason}", "name another, or 0 for any") from error
     finally:
         state.close()
     return OK

@@ -259,9 +259,9 @@ def _demand_sense(options: RecordOptions, page: PageOptions) -> None:
         ("--law", page.law is not None, "--page", options.page),
     ):
         if given and not there:
-            raise ProgramError(f"{name} does nothing without {needed}; name both or neither")
+            raise ProgramError(f"{name} does nothing without {needed}", "name both or neither")
     if options.simulate and options.port:
-        raise ProgramError("--simulate takes no --port; leave one of them out")
+        raise ProgramError("--simulate takes no --port", "leave one of them out")
 
 
 @dataclass(frozen=True, slots=True)
@@ -365,7 +365,8 @@ class _Bench:
         if sys.stdin is None or not sys.stdin.readline():
             raise ProgramError(
                 "several --ruler distances are measured one after the other, each begun with Enter, and the standard "
-                "input is closed; name one --ruler, or run this at a terminal"
+                "input is closed",
+                "name one --ruler, or run this at a terminal",
             )
 
 
@@ -398,10 +399,10 @@ def _virtual(options: RecordOptions, family: Sensor, scene: Scene | None, releas
     """Return a simulated port, on which a sensor of the family sends what it sees of the bench."""
     assert scene is not None
     if os.name == "nt":
-        raise ProgramError("--simulate needs a pseudo-terminal, which this system has not; name a --port")
+        raise ProgramError("--simulate needs a pseudo-terminal, which this system has not", "name a --port")
     if len(options.ruler) > 1 or any(abs(distance_m - REST_M) > 0.05 for distance_m in options.ruler):
         got = ", ".join(f"{each:g}" for each in options.ruler)
-        raise ProgramError(f"--ruler {got}: the simulated bob hangs at {REST_M:g} m; name one --ruler near that")
+        raise ProgramError(f"--ruler {got}: the simulated bob hangs at {REST_M:g} m", "name one --ruler near that")
     waits = options.still is not None or options.ready
     where = "the example bench" if options.scene is None else str(options.scene)
     seconds = options.seconds or UNLIMITED_S

@@ -87,7 +87,7 @@ def scene(
     noted = scene is not None or note or mark or answers
     if check is not None:
         if recordings or noted:
-            raise ProgramError("--check looks at a scene file alone; leave the rest out")
+            raise ProgramError("--check looks at a scene file alone", "leave the rest out")
         checked = read_scene(check)
         ask_about(checked, check)
         print(visible(f"{check}: a scene that states {stated_keys(checked)}"))
@@ -98,20 +98,19 @@ def scene(
         return OK
     if not recordings:
         if noted:
-            raise ProgramError("--scene, --note, --mark and options of reading belong to a recording; name it")
+            raise ProgramError("--scene, --note, --mark and options of reading belong to a recording", "name it")
         print(SCENE_TEMPLATE, end="")
         LOG.log(HINT, "springmass scene > bench.toml, fill it in, springmass scene --check bench.toml")
         return OK
     if not noted:
-        demand = "nothing to save; give --scene, --note, --mark S=TEXT or an option of reading"
-        raise ProgramError(
-            f"{recordings[0]}: {demand}, or check a scene: springmass scene --check {quoted(str(recordings[0]))}"
-        )
+        remedy = "give --scene, --note, --mark S=TEXT or an option of reading"
+        check = f"springmass scene --check {quoted(str(recordings[0]))}"
+        raise ProgramError(f"{recordings[0]}: nothing to save", f"{remedy}, or check a scene: {check}")
     files, messages = files_of([str(each) for each in recordings])
     for line in messages:
         LOG.info(line)
     if missing := next((each.path for each in files if not Path(each.path).is_file()), None):
-        raise ProgramError(f"{missing}: expected a recording, got none; check the name")
+        raise ProgramError(f"{missing}: expected a recording, got none", "check the name")
     stated = None if scene is None else read_scene(scene)
     opened = []
     for each in files if answers else ():  # all are read before any notes are written

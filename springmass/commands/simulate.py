@@ -82,7 +82,7 @@ def simulate(
         given.refuse("without --folder", "--figures")
     where, say = str(against if scene is None else scene), sys.stderr if as_json else sys.stdout
     if output is not None and Path(output).exists() and not overwrite:
-        raise ProgramError(f"{visible(str(output))}: exists; take another name, or --overwrite")
+        raise ProgramError(f"{visible(str(output))}: exists", "take another name, or --overwrite")
     stated, analysis, longest_s = None if scene is None else read_scene(scene), None, seconds or 10.0
     if scene is not None and stated is not None:
         ask_about(stated, scene)
@@ -105,12 +105,12 @@ def simulate(
         smaller = f"take --dt {limit} or less, " if limit else "take "
         other = "auto" if method == STRANG.name else "strang"
         other += "" if math.isfinite(STRANG.stable_step(ready.problem)) else ", which has no limit"
-        raise ProgramError(f"{where}: {wrong}; {smaller}--method {other}, or --force to run it all the same")
+        raise ProgramError(f"{where}: {wrong}", f"{smaller}--method {other}, or --force to run it all the same")
     effects = simulated_effects(ready.stated, ready.problem, dt * count, ready.drag)
     try:
         simulation = simulated(ready.problem, method, dt, count, wanted, check=check)
     except DynamicsError as error:
-        raise ProgramError(f"{where}: {error}") from error
+        raise ProgramError(error.problem, error.remedy, where=f"{where}: ") from error
     print(wrapped(f"band             {of_band}", " " * 17), file=sys.stderr)
     print(_before(_tolerance(wanted, band, given=tolerance is not None), effects), file=say)
     print(_after(simulation, count), file=say)

@@ -49,7 +49,9 @@ def trade(
         analysis = Run.of(recording, given_scene, how.of(reading.options)).analysis
         analysis.track.demand_length("a simulation of the motion")
         if not isinstance(analysis.motion, Oscillation):
-            raise ProgramError(f"{recording}: {analysis.motion.why}; name a run that oscillates", UNREADABLE)
+            raise ProgramError(
+                f"{recording}: {analysis.motion.why}", "name a run that oscillates", exit_code=UNREADABLE
+            )
         motion = motion_of(analysis, analysis.motion)
     elif given_scene is not None:
         from springmass.simulations.simulation import prepare
@@ -60,7 +62,8 @@ def trade(
     if not motion.seconds * motion.frequency_hz >= 2.0 or not motion.theta[0] > 0.0:
         raise ProgramError(
             f"expected a motion of two periods, got {motion.seconds:g} s at {motion.frequency_hz:.3g} Hz from "
-            f"{motion.theta[0]:g} m; take more --seconds, or state a start in the scene"
+            f"{motion.theta[0]:g} m",
+            "take more --seconds, or state a start in the scene",
         )
     kinds = counted(measure_tiers(motion, seeds), len(RECORD_DEFECTS), "kinds of records")
     tiers = [row for rows in kinds for row in rows]

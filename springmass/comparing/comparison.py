@@ -77,15 +77,18 @@ def demand_one_spring(scenes: Sequence[tuple[str, Scene]]) -> None:
     missing = [name for name, scene in scenes if scene.bob_mass_kg is None]
     if missing:
         raise ProgramError(
-            f"compare needs the mass of every run's bob; no [bob] mass_kg for {', '.join(missing)}: "
-            "give --scene FILE, one for all runs or one for each in their order"
+            f"compare needs the mass of every run's bob; no [bob] mass_kg for {', '.join(missing)}",
+            "give --scene FILE, one for all runs or one for each in their order",
+            between=": ",
         )
     first, *others = scenes
     for name, scene in others:
         if scene.spring_mass_kg != first[1].spring_mass_kg:
             raise ProgramError(
                 f"compare takes runs of one spring; [spring] mass_kg is {first[1].spring_mass_kg or 'not given'} for "
-                f"{first[0]} and {scene.spring_mass_kg or 'not given'} for {name}: state the same in both scenes"
+                f"{first[0]} and {scene.spring_mass_kg or 'not given'} for {name}",
+                "state the same in both scenes",
+                between=": ",
             )
 
 

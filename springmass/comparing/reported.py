@@ -82,7 +82,7 @@ def _row(row: Row, runs: Sequence[Run]) -> Reported:
     if unit and unit != si and unit not in _SAME.get(si, ()):
         measure = time_unit(unit) if si == "s" else measure_of(unit)
         if measure is None or measure.si != si:
-            raise ProgramError(f"{where}: {unit!r} is no unit of {_word(name)}; give {si or 'none'}")
+            raise ProgramError(f"{where}: {unit!r} is no unit of {_word(name)}", f"give {si or 'none'}")
         factor = float(10.0**measure.power * measure.factor)
     rounding = 0.5 * 10.0 ** float(numbers["value"].as_tuple().exponent)
     printed = " ".join(filter(None, [text["value"], text["u"] and f"+- {text['u']}", unit]))

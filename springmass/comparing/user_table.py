@@ -42,7 +42,7 @@ class Row:
             value = math.nan
         if not math.isfinite(value):
             got = repr(self.cells.get(column, ""))
-            raise ProgramError(f"{self.where}: {column} must be a finite number, got {got}; correct the table")
+            raise ProgramError(f"{self.where}: {column} must be a finite number, got {got}", "correct the table")
         return value
 
 
@@ -55,9 +55,9 @@ def read_rows(path: str | os.PathLike[str], what: str) -> tuple[list[str], list[
         with open_regular_text(path, "utf-8-sig") as file:
             text = file.read()
     except OSError as error:
-        raise ProgramError(f"{path}: no {what} can be read ({error.strerror}); check the name") from error
+        raise ProgramError(f"{path}: no {what} can be read ({error.strerror})", "check the name") from error
     except UnicodeDecodeError as error:
-        raise ProgramError(f"{path}: not in UTF-8; save the sheet as CSV UTF-8") from error
+        raise ProgramError(f"{path}: not in UTF-8", "save the sheet as CSV UTF-8") from error
     first = next((line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")), "")
     mark = max(",;\t", key=first.count)
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=mark)
@@ -73,8 +73,8 @@ def read_rows(path: str | os.PathLike[str], what: str) -> tuple[list[str], list[
             if not names:
                 names = [cell.lower() for cell in cells]
             elif len(cells) > len(names):
-                wrong = f"expected {len(names)} columns, got {len(cells)}; put quotes around a text with a separator"
-                raise ProgramError(f"{where}: {wrong}")
+                wrong = f"{where}: expected {len(names)} columns, got {len(cells)}"
+                raise ProgramError(wrong, "put quotes around a text with a separator")
             else:
                 filled = {name: cell for name, cell in zip(names, cells, strict=False) if cell}
                 rows.append(Row(where, reader.line_num, filled, mark != ","))

@@ -48,7 +48,9 @@ def compare_rows(rows: Sequence[Mapping[str, Any]]) -> CourseComparison:
     """
     moving = [row for row in rows if row["status"] == "ok"]
     if len(moving) < 2:
-        raise ProgramError(f"compare needs two runs with a period, got {len(moving)}; name a larger course", UNREADABLE)
+        raise ProgramError(
+            f"compare needs two runs with a period, got {len(moving)}", "name a larger course", exit_code=UNREADABLE
+        )
     by = next(name for name in BENCHES if any(name in row for row in moving))
     courses = {row[COURSE] for row in moving}
     runs = [_run(row, by, alone=len(courses) == 1) for row in moving]

@@ -74,13 +74,13 @@ def _dask(address: str) -> Iterator[Workers]:
     try:
         from distributed import Client, KilledWorker
     except ImportError as error:
-        raise ProgramError("--dask needs dask.distributed; pip install 'springmass[dask]'") from error
+        raise ProgramError("--dask needs dask.distributed", "pip install 'springmass[dask]'") from error
     connect: Any = Client
     try:
         client = connect(address, set_as_default=False, timeout=20)
     except (OSError, ValueError, TimeoutError) as error:
         reason = " ".join(str(error).split())
-        raise ProgramError(f"{address}: no dask scheduler answers ({reason}); start dask scheduler") from error
+        raise ProgramError(f"{address}: no dask scheduler answers ({reason})", "start dask scheduler") from error
 
     @contextlib.contextmanager
     def start() -> Iterator[Executor]:
@@ -136,8 +136,8 @@ def _until_one_dies(
                         if not by.address:
                             raise
                         reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
-                        message = f"{by.address}: a run failed ({reason}); run springmass batch again"
-                        raise ProgramError(message, SOME_FAILED) from error
+                        wrong, remedy = f"{by.address}: a run failed ({reason})", "run springmass batch again"
+                        raise ProgramError(wrong, remedy, exit_code=SOME_FAILED) from error
                 yield done
         finally:
             for future in running:

@@ -122,7 +122,7 @@ def _expanded(inputs: Sequence[str]) -> list[str]:
         if any(mark in text for mark in "*?[") and not os.path.exists(text):
             matched = sorted(glob.glob(text, recursive=True))
             if not matched:
-                raise ProgramError(f"{text}: no file matches this pattern", UNREADABLE)
+                raise ProgramError(f"{text}: no file matches this pattern", exit_code=UNREADABLE)
             texts += matched
         else:
             texts.append(text)
@@ -250,26 +250,26 @@ def read_table(path: str | Path) -> RunsTable:
     tags = _tags(path, names)
     for row in rows:
         if "path" not in row.cells:
-            raise ProgramError(f"{row.where}: the path of the run is missing; fill it in")
+            raise ProgramError(f"{row.where}: the path of the run is missing", "fill it in")
     return RunsTable(path, tags, tuple((row.line, row.cells["path"], _values(path.parent, row)) for row in rows))
 
 
 def _tags(path: Path, names: Sequence[str]) -> tuple[str, ...]:
     """Return the tags among the column names; refuse unknown or repeated columns."""
     if "path" not in names:
-        raise ProgramError(f"{path}: no column path, got {', '.join(names)}; see batch --template")
+        raise ProgramError(f"{path}: no column path, got {', '.join(names)}", "see batch --template")
     if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise ProgramError(f"{path}: the column {twice[0]} is there twice; leave one out")
+        raise ProgramError(f"{path}: the column {twice[0]} is there twice", "leave one out")
     tags = tuple(name for name in names if name not in KNOWN)
     for name in tags:
         near = get_close_matches(name, KNOWN, n=1, cutoff=0.85)
         if near or _UNIT.search(name):
             hint = f"did you mean {near[0]}?" if near else f"allowed with a unit are {', '.join(PLACES)}"
-            raise ProgramError(f"{path}: unknown column {name!r}; {hint}")
+            raise ProgramError(f"{path}: unknown column {name!r}", hint)
         if name in RESERVED:
-            raise ProgramError(f"{path}: {name!r} is a column of the results; rename the column")
+            raise ProgramError(f"{path}: {name!r} is a column of the results", "rename the column")
         if not _TAG.fullmatch(name):
-            raise ProgramError(f"{path}: a tag has lower-case letters, digits and _, got {name!r}; rename it")
+            raise ProgramError(f"{path}: a tag has lower-case letters, digits and _, got {name!r}", "rename it")
     return tags
 
 
@@ -283,7 +283,7 @@ def _values(folder: Path, row: Row) -> Values:
         if name in texts:
             values[name] = (row.number(name), row.number(f"{name}_u") if f"{name}_u" in texts else 0.0)
         elif f"{name}_u" in texts:
-            raise ProgramError(f"{row.where}: {name}_u is there without {name}; fill in both")
+            raise ProgramError(f"{row.where}: {name}_u is there without {name}", "fill in both")
     if (law := texts.get(LAW)) not in (None, ANY_LAW, *law_names()):
         laws = ", ".join((*law_names(), ANY_LAW))
         raise ProgramError(f"{row.where}: {LAW} must be one of {laws}, got {law!r}")
@@ -315,7 +315,7 @@ def join(table: RunsTable, files: Sequence[InputFile]) -> tuple[list[tuple[Input
                 continue
             if clash := sorted(x for x in base.keys() & values.keys() if base[x] != values[x]):
                 wrong = f"lines {first} and {line} both match {file.path} and differ in {clash[0]}"
-                raise ProgramError(f"{table.path}: {wrong}; narrow one of the patterns")
+                raise ProgramError(f"{table.path}: {wrong}", "narrow one of the patterns")
             base, first = {**base, **values}, first or line
             used.add(line)
         lines: dict[tuple[Any, Any], int] = {}
@@ -323,7 +323,7 @@ def join(table: RunsTable, files: Sequence[InputFile]) -> tuple[list[tuple[Input
             which = (values.get("run"), values.get("channel"))
             if which in lines:
                 wrong = f"lines {lines[which]} and {line} both name {file.path}"
-                raise ProgramError(f"{table.path}: {wrong}; leave one out, or give each another run or channel")
+                raise ProgramError(f"{table.path}: {wrong}", "leave one out, or give each another run or channel")
             lines[which] = line
             joined.append((file, line, {**base, **values}))
         used |= set(lines.values())

@@ -76,7 +76,7 @@ def is_course(folder: str | os.PathLike[str]) -> bool:
 def read_rows(folder: str | os.PathLike[str]) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
     """Return the rows of ``results.csv`` by column, and the course's own columns; an empty cell is None."""
     if not is_course(folder):
-        raise ProgramError(f"{folder}: expected a folder that springmass batch made; name that of its -o")
+        raise ProgramError(f"{folder}: expected a folder that springmass batch made", "name that of its -o")
     path = os.path.join(folder, CSV)
     try:
         with open_regular_text(path, "utf-8", newline="") as file:
@@ -86,7 +86,7 @@ def read_rows(folder: str | os.PathLike[str]) -> tuple[list[dict[str, Any]], tup
             raise ValueError(f"no column {missing[0]}")
         found = [{name: _value(name, row[name]) for name in names} for row in rows]
     except (OSError, ValueError, TypeError, csv.Error) as error:
-        raise ProgramError(f"{path}: damaged ({error}); run springmass batch again", UNREADABLE) from error
+        raise ProgramError(f"{path}: damaged ({error})", "run springmass batch again", exit_code=UNREADABLE) from error
     return found, tuple(name for name in names if name not in RESERVED)
 
 

@@ -69,11 +69,10 @@ class Store:
             yield
         except sqlite3.Error as error:
             if error.sqlite_errorname == "SQLITE_BUSY":
-                wrong = f"{self._path.parent}: in use by another process; wait for its end"
-                raise ProgramError(wrong) from error
+                raise ProgramError(f"{self._path.parent}: in use by another process", "wait for its end") from error
             if error.sqlite_errorname in ("SQLITE_NOTADB", "SQLITE_CORRUPT", "SQLITE_ERROR"):
                 remedy = "remove it, and batch analyses all runs again"
-                raise ProgramError(f"{self._path}: damaged ({error}); {remedy}", UNREADABLE) from error
+                raise ProgramError(f"{self._path}: damaged ({error})", remedy, exit_code=UNREADABLE) from error
             problem = f"could not be written ({error})"
             raise WriteFailed(self._path, problem, "check the disk space and the permissions") from error
 
@@ -91,7 +90,7 @@ def opened(folder: Path) -> Iterator[Store]:
         except BlockingIOError as error:
             file.seek(0)
             holder = file.read(200).decode("utf-8", "replace") or "another process"
-            raise ProgramError(f"{folder}: in use by {holder}; wait for its end") from error
+            raise ProgramError(f"{folder}: in use by {holder}", "wait for its end") from error
         except OSError:
             LOG.info(f"{folder}: this disk has no locks; let only one batch at a time write there")
         with writing(path):

@@ -82,7 +82,7 @@ def blank_row(task: Task, status: str = "failed", error: str = "") -> dict[str, 
 def _line(task: Task, failed: Failed, remedy: Remedy) -> str:
     """Return why there is no run, in one line that names it as the inputs do."""
     asked = failed.question
-    message = failed.message if asked is None else str(asked.with_remedy(remedy(asked.question)))
+    message = str(failed.error) if asked is None else str(asked.with_remedy(remedy(asked.question)))
     line = " ".join(message.replace(task.source, task.name).split())
     return line if task.name in line else f"{task.name}: {line}"
 

@@ -61,7 +61,7 @@ def refuse_reading(options: AnalysisOptions) -> None:
 def _demand(options: AnalysisOptions, allowed: Collection[str], what: str) -> None:
     reading = {each.name for each in fields(LoadOptions)}
     if others := [name for name in options.given() if name in reading and name not in allowed]:
-        raise TrackError(f"{', '.join(others)} complete recordings named by a path, got a {what}; leave that out")
+        raise TrackError(f"{', '.join(others)} complete recordings named by a path, got a {what}", "leave that out")
 
 
 def _stated(source: Any, about: Mapping[str, Any], samples: Block) -> Loaded | None:
@@ -132,7 +132,9 @@ def _columns(source: Any) -> tuple[_ArrayColumn, _ArrayColumn, Any]:
     elif isinstance(source, list | tuple) and len(source) == 2:
         return _ArrayColumn(source[0]), _ArrayColumn(source[1]), None
     if coords := ", ".join(map(str, getattr(source, "coords", ()))):
-        raise TrackError(f"its times were expected as a coordinate named time, got {coords}; rename the one with times")
+        raise TrackError(
+            f"its times were expected as a coordinate named time, got {coords}", "rename the one with times"
+        )
     raise TrackError(f"{EXPECTED}, got {type(source).__name__}")
 
 
@@ -143,7 +145,9 @@ def _by_headings(frame: Any) -> tuple[_ArrayColumn, _ArrayColumn]:
     others = [(name, unit) for name, words, unit in headings if not is_time(words)]
     if len(times) != 1 or len(others) != 1:
         named = ", ".join(repr(name) for name, *_ in headings)
-        raise TrackError(f"one column of times and one of values were expected, got {named}: choose two of them")
+        raise TrackError(
+            f"one column of times and one of values were expected, got {named}", "choose two of them", between=": "
+        )
     return _ArrayColumn(frame[times[0][0]], times[0][1]), _ArrayColumn(frame[others[0][0]], others[0][1])
 
 
@@ -154,7 +158,9 @@ def _index_of(source: Any) -> Any:
     import pandas as pd
 
     if isinstance(source.index, pd.RangeIndex):
-        raise TrackError('its index counts rows and is no time: give times as its index, or as a column "time"')
+        raise TrackError(
+            "its index counts rows and is no time", 'give times as its index, or as a column "time"', between=": "
+        )
     return source.index
 
 
@@ -169,7 +175,9 @@ def _unit_of(values: Any) -> str:
 def _measure(unit: str) -> units.Measure:
     measure = units.measure_of(unit.replace("**", "^").replace(" ", ""))
     if measure is None:
-        raise TrackError(f"unknown unit {unit!r} of the values: give unit=, one of {', '.join(units.MEASURES)}")
+        raise TrackError(
+            f"unknown unit {unit!r} of the values", f"give unit=, one of {', '.join(units.MEASURES)}", between=": "
+        )
     return measure
 
 
@@ -177,11 +185,11 @@ def _numbers(values: Any, what: str) -> F8:
     """Return numbers as an array; masked values are missing, and complex ones are refused."""
     plain = np.ma.asarray(getattr(values, "magnitude", values))
     if plain.dtype.kind == "c":
-        raise TrackError(f"{what} are complex numbers: give their real part, or their absolute value")
+        raise TrackError(f"{what} are complex numbers", "give their real part, or their absolute value", between=": ")
     try:
         return np.asarray(np.ma.filled(plain.astype(np.float64), np.nan))
     except (TypeError, ValueError):
-        raise TrackError(f"{what} are no numbers, but {plain.dtype}: convert them first") from None
+        raise TrackError(f"{what} are no numbers, but {plain.dtype}", "convert them first", between=": ") from None
 
 
 def _seconds(t: Any, unit: str) -> F8:
@@ -199,5 +207,7 @@ def _seconds(t: Any, unit: str) -> F8:
         return np.asarray(times / np.timedelta64(1, "s"), np.float64)
     measure = units.time_unit(unit or "s")
     if measure is None:
-        raise TrackError(f"unknown unit {unit!r} of the times: give time_unit=, one of {', '.join(units.TIMES)}")
+        raise TrackError(
+            f"unknown unit {unit!r} of the times", f"give time_unit=, one of {', '.join(units.TIMES)}", between=": "
+        )
     return np.asarray(_numbers(t, "times") * (10.0**measure.power * measure.factor))

@@ -49,7 +49,9 @@ def files_of(
             taken += in_it
             others += [str((folder / name).relative_to(text)) for name in not_in_it]
         if not taken:
-            raise ProgramError(f"{text}: expected a folder with recordings, got none{_named(others)}", UNREADABLE)
+            raise ProgramError(
+                f"{text}: expected a folder with recordings, got none{_named(others)}", exit_code=UNREADABLE
+            )
         numbers = f"{count(len(taken), 'recording')}; {count(len(others), 'other file')}"
         messages.append(f"{text}: {numbers}{_named(others)}")
         named += taken
@@ -86,7 +88,9 @@ def _in_folder(
             if path.is_file() and not path.name.startswith(".") and not (but and os.path.abspath(path) in but)
         )
     except OSError as error:
-        raise ProgramError(f"{folder}: cannot read the folder ({error.strerror}); name another", UNREADABLE) from error
+        raise ProgramError(
+            f"{folder}: cannot read the folder ({error.strerror})", "name another", exit_code=UNREADABLE
+        ) from error
     names = {path.name for path in files}
     pairs = {path.name: name for path in files if (name := _velocity_of(path)) in names}
     made = {path.name for path in files if path.suffix == ".wire" and f"{path.stem}.h5" in names}

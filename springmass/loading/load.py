@@ -80,7 +80,7 @@ def _load_stdin(options: LoadOptions) -> Loaded:
     with tempfile.TemporaryDirectory(prefix="springmass-") as folder:
         spooled = Path(folder) / "stdin"
         if sys.stdin is None:
-            raise ProgramError("standard input is closed; name a file", UNREADABLE)
+            raise ProgramError("standard input is closed", "name a file", exit_code=UNREADABLE)
         with open(spooled, "wb") as file:
             shutil.copyfileobj(sys.stdin.buffer, file)
         try:
@@ -99,14 +99,16 @@ def sample_data() -> Path:
     folder = part("sample_data")
     if (folder / "undamped_simulated_position.txt").is_file():
         return folder
-    raise ProgramError(f"{folder}: the bundled recordings are missing; install springmass again", UNREADABLE)
+    raise ProgramError(
+        f"{folder}: the bundled recordings are missing", "install springmass again", exit_code=UNREADABLE
+    )
 
 
 def _refuse(path: Path, what: str, options: LoadOptions, allowed: Sequence[str]) -> None:
     """Refuse options that describe a file which already states everything itself."""
     given = [name for name in options.about_the_file().given() if name not in allowed]
     if given:
-        raise ProgramError(f"{path}: {what} states everything, got {', '.join(given)} too; leave that out")
+        raise ProgramError(f"{path}: {what} states everything, got {', '.join(given)} too", "leave that out")
 
 
 def _load_run(path: Path, *, unverified: bool = False) -> Loaded:

@@ -22,6 +22,7 @@ from springmass.loading.track import between, to_track
 from storage.run_file.reading import open_run
 
 UNVERIFIED = "unverified"
+SAMPLES_PER_BLOCK = 1024
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +97,9 @@ class Loaded:
         if not self.originals_inside:
             return self.recording.originals
         if sha256_of(self.path) != self.sha256:
-            raise ProgramError(f"{self.path}: the file has changed since it was loaded; load it again", UNREADABLE)
+            raise ProgramError(
+                f"{self.path}: the file has changed since it was loaded", "load it again", exit_code=UNREADABLE
+            )
         with open_run(self.path, unverified=any(trap.code == UNVERIFIED for trap in self.traps)) as run:
             return run.originals()
 
@@ -110,13 +113,13 @@ class Loaded:
             times = self.track.t[np.isfinite(self.track.t)]
             span = f"spans {times.min():g} to {times.max():g} s" if times.size else "holds no sample"
             where = self.source or "arrays"
-            raise ProgramError(f"{where}: no sample lies between {low:g} and {high:g} s; the record {span}")
+            raise ProgramError(f"{where}: no sample lies between {low:g} and {high:g} s", f"the record {span}")
         return part
 
-    def samples_in_blocks(self, size: int = 1024) -> Iterator[Block]:
-        """Yield the samples in blocks of at most ``size``."""
-        for start in range(0, len(self.samples), size):
-            yield self.samples[start : start + size]
+    def samples_in_blocks(self) -> Iterator[Block]:
+        """Yield the samples in blocks."""
+        for start in range(0, len(self.samples), SAMPLES_PER_BLOCK):
+            yield self.samples[start : start + SAMPLES_PER_BLOCK]
 
 
 def sha256_of(path: Path) -> str:

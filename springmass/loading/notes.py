@@ -80,16 +80,16 @@ def about_of(recording: Path) -> About:
     tables = read_tables(path)
     allowed = ("scene", "notes", "marks", *(("reading",) if path == _answers_path(recording) else ()))
     if unknown := sorted(set(tables) - set(allowed)):
-        raise ProgramError(f"{path}: unknown key {unknown[0]!r}; allowed are {', '.join(allowed)}")
+        raise ProgramError(f"{path}: unknown key {unknown[0]!r}", f"allowed are {', '.join(allowed)}")
     try:
         scene = Scene.from_mapping(tables["scene"], where=f"{path} [scene]") if "scene" in tables else None
         marks = tuple((float(mark["t_s"]), str(mark["text"])) for mark in tables.get("marks", ()))
         notes = tuple(str(note) for note in tables.get("notes", ()))
     except SceneError as error:
-        raise ProgramError(str(error)) from error
+        raise ProgramError(error.problem, error.remedy) from error
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         demand = "notes are a list of texts, marks are [[marks]] with t_s and text"
-        raise ProgramError(f"{path}: {demand}; mend or remove the file") from error
+        raise ProgramError(f"{path}: {demand}", "mend or remove the file") from error
     return About(path, scene, notes, marks, tables.get("reading", {}))
 
 
@@ -108,10 +108,10 @@ def write_about(about: About) -> Path:
     try:
         content = tomli_w.dumps(tables).encode()
     except UnicodeEncodeError as error:
-        raise ProgramError(f"{about.path}: a note is not text in UTF-8; write it in other letters") from error
+        raise ProgramError(f"{about.path}: a note is not text in UTF-8", "write it in other letters") from error
     if len(content) > LONGEST_SCENE:
         demand = f"all notes together take at most {LONGEST_SCENE} bytes, got {len(content)}"
-        raise ProgramError(f"{about.path}: {demand}; shorten the new note, or keep long notes in a file of your own")
+        raise ProgramError(f"{about.path}: {demand}", "shorten the new note, or keep long notes in a file of your own")
     return write_whole(about.path, content, overwrite=True)
 
 
@@ -152,7 +152,7 @@ def answers_of(recording: Path) -> KeptAnswers:
     try:
         answers = {name: value_of(name, value) for name, value in table.items()}
     except ValueError as error:
-        raise ProgramError(f"{path}: [reading]: {error}; mend or remove the line") from error
+        raise ProgramError(f"{path}: [reading]: {error}", "mend or remove the line") from error
     if "velocity" in answers:
         answers["velocity"] = os.path.join(path.parent, str(answers["velocity"]))
     return KeptAnswers(path, ReadOptions.of(answers), sha256)

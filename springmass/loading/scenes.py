@@ -30,8 +30,8 @@ def read_scenes(paths: Sequence[str | Path], count: int) -> list[Scene | None]:
     """Return one scene per run, read from one file for all runs or one file for each in order; None without a file."""
     if len(paths) not in (0, 1, count):
         raise ProgramError(
-            f"--scene was given {len(paths)} times for {count} runs; give it once for all of them, "
-            "or once for each in their order"
+            f"--scene was given {len(paths)} times for {count} runs",
+            "give it once for all of them, or once for each in their order",
         )
     scenes: list[Scene | None] = [read_scene(path) for path in paths] or [None]
     return scenes * count if len(scenes) == 1 else scenes
@@ -50,7 +50,7 @@ def scene_from(given: Any) -> Scene | None:
         return Scene.from_mapping(given)
     if not isinstance(given, str | os.PathLike):
         demand = f"scene must be a Scene, a mapping of its tables or a path, got {visible(repr(given)[:80])}"
-        raise ProgramError(f"{demand}; name a file")
+        raise ProgramError(demand, "name a file")
     return read_scene(Path(given))
 
 
@@ -60,11 +60,11 @@ def read_tables(path: str | Path) -> dict[str, Any]:
         with open_regular(path) as file:
             content = file.read(LONGEST_SCENE + 1) or b""
     except OSError as error:
-        raise ProgramError(f"{path}: cannot read the scene file ({error.strerror}); check the name") from error
+        raise ProgramError(f"{path}: cannot read the scene file ({error.strerror})", "check the name") from error
     if len(content) > LONGEST_SCENE:
         raise ProgramError(
-            f"{path}: expected a scene file of at most {LONGEST_SCENE} bytes, got a longer one; "
-            "name the scene, not the recording"
+            f"{path}: expected a scene file of at most {LONGEST_SCENE} bytes, got a longer one",
+            "name the scene, not the recording",
         )
     text = ""
     try:
@@ -75,11 +75,10 @@ def read_tables(path: str | Path) -> dict[str, Any]:
     # An integer of thousands of digits raises a plain ValueError; thousands of nested brackets, a RecursionError.
     except (ValueError, RecursionError) as error:
         if unfilled := re.search(r"^\s*(\w+)\s*=[^#\n]*\.\.\.", text, re.MULTILINE):
-            demand = f"{unfilled[1]} has no number yet; put yours for the dots, or # before the line"
-            raise ProgramError(f"{path}: {demand}") from error
+            demand = f"{path}: {unfilled[1]} has no number yet"
+            raise ProgramError(demand, "put yours for the dots, or # before the line") from error
         reason = " ".join(str(error).split())
-        demand = f"not a TOML file ({reason}); see the scene file in the reference"
-        raise ProgramError(f"{path}: {demand}") from error
+        raise ProgramError(f"{path}: not a TOML file ({reason})", "see the scene file in the reference") from error
 
 
 def amended(scene: Scene, values: Amendments, *, where: str) -> Scene:
@@ -90,7 +89,7 @@ def amended(scene: Scene, values: Amendments, *, where: str) -> Scene:
     try:
         return Scene.from_mapping(tables, where=where)
     except SceneError as error:
-        raise ProgramError(str(error)) from error
+        raise ProgramError(error.problem, error.remedy) from error
 
 
 def stated_keys(scene: Scene) -> str:

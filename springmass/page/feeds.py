@@ -13,7 +13,7 @@ from acquisition.events import Calibrated, RunEnded, StoredEvent, Triggered, Zer
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
 from springmass.loading.loaded import Loaded
-from springmass.page.view import SampleBuffer, View
+from springmass.page.view import SensorSamples, View
 from springmass.report.recorded import event_words
 from storage.errors import NotALog, StorageError
 from storage.schema import plain
@@ -39,7 +39,7 @@ class LogFeed:
         self.scene = header.scene
         self._scan = self._log.scan()
         self._sensors = {sensor.channel: sensor for sensor in header.sensors}
-        self._series: dict[Part, SampleBuffer] = {}
+        self._series: dict[Part, SensorSamples] = {}
         self._shown = [Part(channel, 1) for channel in self._sensors]
         self._timed: list[Record] = []
         self.view = View(
@@ -88,7 +88,7 @@ class LogFeed:
         if part.number == 1:
             self._series[part] = self.view.series[number]
         else:
-            self._series[part] = SampleBuffer()
+            self._series[part] = SensorSamples()
             series = [self._series[shown] for shown in self._shown]
             self.view = replace(self.view, series=series, session=secrets.token_hex(8))
         return chain_of(self._sensors[part.sensor])

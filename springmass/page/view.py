@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition.block import Block, ClockKind, SourceInfo
+from acquisition.buffer import SampleBuffer
 from acquisition.recordings.recording import FormatIssue
 from pipeline.track import Track
 from springmass.loading.track import to_track
@@ -25,36 +25,19 @@ SHOWN_NOTES = 20  # the latest
 _HEAD = struct.Struct("<4I")
 
 
-class SampleBuffer:
-    """One sensor's samples; the room grows by doubling, so that the cost per sample stays constant."""
+class SensorSamples(SampleBuffer):
+    """The samples of one sensor, the number without a distance, and the host time of t = 0."""
 
     def __init__(self) -> None:
-        self._columns: list[NDArray[Any]] = [np.empty(1024, kind) for kind in (float, float, np.uint8, np.int64)]
-        self._count = 0
+        super().__init__()
         self.missing = 0
         self.origin = Origin()
 
-    def __len__(self) -> int:
-        return self._count
-
     def push(self, block: Block) -> None:
         """Append samples."""
-        stop = self._count + len(block)
-        if stop > self._columns[0].size:
-            room = max(stop, 2 * self._columns[0].size) - self._count
-            self._columns = [np.concatenate([c[: self._count], np.empty(room, c.dtype)]) for c in self._columns]
-        host_ns = -1 if block.host_ns is None else block.host_ns
-        for column, new in zip(self._columns, (block.t, block.distance, block.flags, host_ns), strict=True):
-            column[self._count : stop] = new
+        super().push(block)
         self.missing += int(np.count_nonzero(np.isnan(block.distance)))
         self.origin.push(block)
-        self._count = stop  # last, because the analysis reads in another thread
-
-    def block(self) -> Block:
-        """Return all samples as they are now."""
-        count = self._count
-        t, distance, flags, host_ns = (column[:count] for column in self._columns)
-        return Block(0, t, distance, flags, host_ns)
 
     def message(self, sensor: int, first: int) -> bytes:
         """Return at most 50,000 samples, starting at index ``first``, as a binary message.
@@ -62,9 +45,8 @@ class SampleBuffer:
         Four little-endian unsigned integers of 32 bits (1, sensor, first, count), then ``count`` times in s and
         ``count`` values as 64-bit floats; a missing sample is NaN.
         """
-        stop = min(self._count, first + MOST_PER_MESSAGE)
-        t, y = (column[first:stop].astype("<f8", copy=False).tobytes() for column in self._columns[:2])
-        return _HEAD.pack(1, sensor, first, stop - first) + t + y
+        t, y = self[first : first + MOST_PER_MESSAGE][:2]
+        return _HEAD.pack(1, sensor, first, t.size) + t.astype("<f8").tobytes() + y.astype("<f8").tobytes()
 
 
 @dataclass(eq=False)
@@ -86,7 +68,7 @@ class View:
     clock: ClockKind = "device"
     simulated: bool = False
     calibration: str = ""
-    series: list[SampleBuffer] = field(default_factory=list)
+    series: list[SensorSamples] = field(default_factory=list)
     session: str = field(default_factory=lambda: secrets.token_hex(8))
     marks: list[tuple[float, str]] = field(default_factory=list)
     notes: deque[str] = field(default_factory=lambda: deque(maxlen=SHOWN_NOTES))
@@ -99,7 +81,7 @@ class View:
     zero: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.series = self.series or [SampleBuffer() for _ in self.sensors]
+        self.series = self.series or [SensorSamples() for _ in self.sensors]
 
     def track(self) -> Track:
         """Return the first sensor's samples so far, in the form for an analysis."""

@@ -80,6 +80,6 @@ def make_folder(path: str | Path) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ProgramError(
-            f"{folder}: cannot make the folder for results ({error.strerror}); name another with -o"
+            f"{folder}: cannot make the folder for results ({error.strerror})", "name another with -o"
         ) from error
     return folder

@@ -201,7 +201,7 @@ class Run(Mapping[str, Value]):
         from springmass.charts.run import CHARTS
 
         if chart not in CHARTS:
-            raise AnalysisError(f"no chart {chart!r}; there are {', '.join(CHARTS)}")
+            raise AnalysisError(f"no chart {chart!r}", f"there are {', '.join(CHARTS)}")
         drawn = CHARTS[chart](self.analysis)
         if drawn is None:
             if not isinstance(self.analysis.motion, Oscillation):
@@ -209,7 +209,7 @@ class Run(Mapping[str, Value]):
             needs = (
                 "[bob] mass_kg, [disc] diameter_m and an amplitude that falls" if chart == "drag" else "more periods"
             )
-            raise AnalysisError(f"the chart {chart} needs {needs}; state them in the scene, or record longer")
+            raise AnalysisError(f"the chart {chart} needs {needs}", "state them in the scene, or record longer")
         if ax is None:
             from matplotlib import pyplot
 

@@ -10,7 +10,7 @@ from typing import Any
 from acquisition.errors import AcquisitionError, NeedsAnswer
 from pipeline.bench.scene import Scene
 from pipeline.errors import PipelineError
-from springmass.errors import INTERNAL, NO_MEMORY, UNREADABLE, ProgramError, internal_error
+from springmass.errors import INTERNAL, NO_MEMORY, UNREADABLE, Error, ProgramError, internal_error
 from springmass.loading.options import ANALYSIS_DEFAULTS, AnalysisOptions
 from springmass.loading.scenes import Amendments, amended
 from springmass.runs.run import Run
@@ -30,11 +30,10 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class Failed:
-    """A recording that gives no run: the exit code, a line that says why, and the question that it leaves open."""
+    """A recording that gives no run: why, and the question that it leaves open."""
 
     task: Task
-    code: int
-    message: str
+    error: ProgramError
     question: NeedsAnswer | None = None
 
 
@@ -49,17 +48,23 @@ def analyse_all(tasks: Iterable[Task]) -> Iterator[Run | Failed]:
             _ = run.analysis
             yield run
         except NeedsAnswer as error:
-            yield Failed(task, UNREADABLE, str(error), error)
+            yield Failed(task, _unreadable(error, error.where), error)
         except ProgramError as error:
-            yield Failed(task, error.exit_code, str(error))
+            yield Failed(task, error)
         except (AcquisitionError, StorageError) as error:
-            yield Failed(task, UNREADABLE, str(error))
-        except (PipelineError, OSError) as error:
-            yield Failed(task, UNREADABLE, f"{where}: {error}")
+            yield Failed(task, _unreadable(error, error.where))
+        except PipelineError as error:
+            yield Failed(task, _unreadable(error, f"{where}: "))
+        except OSError as error:
+            yield Failed(task, ProgramError(f"{where}: {error}", exit_code=UNREADABLE))
         except MemoryError:
-            yield Failed(task, UNREADABLE, f"{where}: {NO_MEMORY}")
+            yield Failed(task, ProgramError(f"{where}: {NO_MEMORY}", exit_code=UNREADABLE))
         except Exception as error:  # a defect that one recording meets must not keep the others from their results
-            yield Failed(task, INTERNAL, f"{where}: {internal_error(error)}")
+            yield Failed(task, ProgramError(f"{where}: {internal_error(error)}", exit_code=INTERNAL))
+
+
+def _unreadable(error: Error, where: str) -> ProgramError:
+    return ProgramError(error.problem, error.remedy, where=where, between=error.between, exit_code=UNREADABLE)
 
 
 def analysed(tasks: Iterable[Task]) -> list[Run]:
@@ -67,7 +72,7 @@ def analysed(tasks: Iterable[Task]) -> list[Run]:
     runs = []
     for outcome in analyse_all(tasks):
         if isinstance(outcome, Failed):
-            raise outcome.question or ProgramError(outcome.message, outcome.code)
+            raise outcome.question or outcome.error
         runs.append(outcome)
     return runs
 

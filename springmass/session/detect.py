@@ -35,7 +35,7 @@ def name_sensors(
         else:
             demand = "no rangefinder that is known speaks; name it with --port and --sensor, or take --simulate"
         listed = "; ".join(descriptions) or "this machine has no serial port"
-        raise ProgramError(f"record looked for a rangefinder: {demand}: {listed}", SENSOR)
+        raise ProgramError(f"record looked for a rangefinder: {demand}: {listed}", exit_code=SENSOR)
     for address, name, speed in named:
         LOG.info(f"{address}: a {name} sensor at {speed} baud")
     measured = named[0][2] if len(named) == 1 else None

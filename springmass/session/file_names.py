@@ -32,14 +32,14 @@ def demand_new(path: Path, sensors: int) -> None:
     parts = [part for run in runs for part in sorted(run.parent.glob(f"{glob.escape(run.stem)}.part*.h5"))]
     for there in dict.fromkeys((path, path.with_suffix(".wire"), *runs, *parts)):
         if (size := len(os.fsencode(there.name))) > longest:
-            why = f"expected a name of at most {longest} bytes, got {size}; choose a shorter one"
+            why, remedy = f"expected a name of at most {longest} bytes, got {size}", "choose a shorter one"
         elif there.is_symlink() and not there.exists():
-            why = "it is a link to a file that does not exist; remove it or choose another name"
+            why, remedy = "it is a link to a file that does not exist", "remove it or choose another name"
         elif there.exists():
-            why = "exists already, and a recording never replaces one; choose another name"
+            why, remedy = "exists already, and a recording never replaces one", "choose another name"
         else:
             continue
-        raise ProgramError(f"{there}: {why}")
+        raise ProgramError(f"{there}: {why}", remedy)
 
 
 def _longest_name(folder: Path) -> int:

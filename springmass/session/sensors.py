@@ -16,6 +16,7 @@ from acquisition.live.firmware import FIRMWARE_VERSION, MODEL
 from acquisition.live.serial_port import SerialPort
 from acquisition.live.timebase import WRAP_US
 from acquisition.readings import Reading
+from springmass.errors import SENSOR, ProgramError
 from storage.wire_log.records import SensorEntry
 
 ANSWERED = 12
@@ -77,15 +78,13 @@ class OpenSensor:
             calibration=dict(self.calibration.to_mapping()),
         )
 
-    def not_heard(self, heard: bytes) -> str:
-        """Return a line that describes what was received instead of readings."""
+    def not_heard(self, heard: bytes) -> ProgramError:
+        """Return an error that describes what was received instead of readings."""
         what = "not a byte came; is the sensor powered, its line on the right pin?"
         if heard:
             what = describe_bytes(heard, self.options if self.family.name == "text-lines" else None)
-        return (
-            f"{self.port.name}: a {self.family.name} sensor at {self.baud} baud was expected, {what}; "
-            "see `springmass ports` for --sensor and --baud"
-        )
+        wrong = f"{self.port.name}: a {self.family.name} sensor at {self.baud} baud was expected, {what}"
+        return ProgramError(wrong, "see `springmass ports` for --sensor and --baud", exit_code=SENSOR)
 
 
 def meeting(sensor: OpenSensor, identity: Identity) -> Iterator[str]:

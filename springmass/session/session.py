@@ -145,8 +145,10 @@ class Session:
     def _end_unheard(self, channel: int) -> None:
         self.stop()
         if channel in self._tee.gone:
-            raise ProgramError(f"{self._tee.gone[channel]}; is a sensor connected, and is this its port?", SENSOR)
-        raise ProgramError(self.sensors[channel].not_heard(self._tee.heard(channel)), SENSOR)
+            raise ProgramError(
+                self._tee.gone[channel], "is a sensor connected, and is this its port?", exit_code=SENSOR
+            )
+        raise self.sensors[channel].not_heard(self._tee.heard(channel))
 
     def still(self, seconds: float = 3.0) -> StillPoint:
         """Return rest position and noise from the first sensor's next seconds, during which the bob must hang still."""

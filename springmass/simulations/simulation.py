@@ -121,7 +121,7 @@ def count_of(seconds: float, spacing_s: float) -> int:
     count = round(seconds / spacing_s) if spacing_s > 0 else 0
     if not 1 <= count <= MOST_SAMPLES:
         raise ProgramError(
-            f"--seconds {seconds:g} at --dt {spacing_s:g} makes {count} steps; allowed are 1 to {MOST_SAMPLES}"
+            f"--seconds {seconds:g} at --dt {spacing_s:g} makes {count} steps", f"allowed are 1 to {MOST_SAMPLES}"
         )
     return count
 

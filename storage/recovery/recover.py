@@ -27,7 +27,7 @@ from storage.recovery.report import LossCount, Losses, RecoveredRun, RecoverRepo
 from storage.run_file.reading import open_run
 from storage.run_file.writing import run_writer
 from storage.schema import json_text, parsed, plain
-from storage.wire_log.records import LogHeader, SensorEntry
+from storage.wire_log.records import SensorEntry
 from storage.wire_log.scanning import FOREIGN, Damage, LogContents, read_log
 from storage.wire_log.survey import LogSurvey, Part
 from storage.wire_log.wire_samples import LogDecoder, Origin, chain_of
@@ -98,7 +98,6 @@ def recover(
     *,
     overwrite: bool = False,
     remove_log: bool = False,
-    header: LogHeader | None = None,
     speed_of_sound_m_per_s: float | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> RecoverReport:
@@ -106,8 +105,7 @@ def recover(
 
     The run file has the log's name with the suffix ``.h5``, or the name ``out_path``. With several sensors the channel
     comes before the suffix: ``run.0.h5``, ``run.1.h5``. Later parts of a sensor are ``run.part2.h5`` or
-    ``run.0.part2.h5``. ``header`` is used if every copy of the header in the log is lost, and ``provenance`` becomes
-    part of the provenance in the run files.
+    ``run.0.part2.h5``. ``provenance`` becomes part of the provenance in the run files.
 
     The log is removed with ``remove_log``, after every run file has been read back and contains the whole log.
 
@@ -121,7 +119,7 @@ def recover(
     if contents.being_written():
         problem = f"a recording still writes this log ({contents.size} bytes so far)"
         raise LogGrowing(contents.path, problem, "recover it after the recording has ended")
-    survey = _survey_of(contents, header)
+    survey = _survey_of(contents)
     sensors = [_calibrated(sensor, survey, speed_of_sound_m_per_s) for sensor in survey.header.sensors]
     out = contents.path if out_path is None else Path(out_path)
     paths = _paths(out, survey)
@@ -173,11 +171,10 @@ def _long_parts(survey: LogSurvey, channel: int) -> list[Part]:
     return [part for part in parts if part.number == 1 or survey.spans[part].seconds >= SHORTEST_PART_S]
 
 
-def _survey_of(contents: LogContents, stand_in: LogHeader | None) -> LogSurvey:
-    """Return the survey of a log; ``stand_in`` is used if both copies of its header are lost."""
-    header = contents.header or stand_in
-    if header is not None:
-        return LogSurvey(contents, header)
+def _survey_of(contents: LogContents) -> LogSurvey:
+    """Return the survey of a log; NotALog if both copies of its header are lost."""
+    if contents.header is not None:
+        return LogSurvey(contents, contents.header)
     if not contents.damage.records:
         problem = f"expected a wire log, got {contents.size} bytes without a record"
         raise NotALog(contents.path, problem, "name another file")
@@ -235,7 +232,7 @@ def _readers(
 def open_log(path: str | os.PathLike[str]) -> tuple[LogContents, LogSurvey]:
     """Return a log, which may still be written, and its survey; NotALog says why a log cannot be decoded."""
     contents = read_log(path)
-    survey = _survey_of(contents, None)
+    survey = _survey_of(contents)
     _readers(contents, survey.header.sensors, survey.spans)
     return contents, survey
 

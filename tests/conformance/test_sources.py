@@ -33,20 +33,16 @@ def replay(speed: float | None) -> Callable[[Clock], Source]:
     return lambda clock: Replay([run()[:4000], run()[4000:]], clock, info=info, speed=speed)
 
 
-def simulated(block_samples: int) -> Callable[[Clock], Source]:
-    """Return a maker of simulated sources with noise, false echoes and readings without a target."""
+def simulated(clock: Clock) -> Source:
+    """Return a simulated source with noise, false echoes and readings without a target."""
     sensor = VirtualSensor(rate_hz=RATE_HZ, false_echo_rate_hz=0.5, dead_time_s=1.17e-3)
-
-    def make(clock: Clock) -> Source:
-        bob = VirtualRangefinder(lambda t: 0.25 + 0.05 * math.sin(7.9 * t), sensor, np.random.default_rng(1))
-        return Replay([bob.block(SECONDS)], clock, info=bob.info("run"), block_samples=block_samples)
-
-    return make
+    bob = VirtualRangefinder(lambda t: 0.25 + 0.05 * math.sin(7.9 * t), sensor, np.random.default_rng(1))
+    return Replay([bob.block(SECONDS)], clock, info=bob.info("run"))
 
 
 REPLAYS = {"replay-1x": replay(1.0), "replay-10x": replay(10.0), "replay-max": replay(None)}
 """Makers of sources that deliver :func:`run`."""
-SOURCES = {**REPLAYS, "simulated": simulated(1), "simulated-in-blocks": simulated(64)}
+SOURCES = {**REPLAYS, "simulated": simulated}
 """Makers of sources that deliver two minutes at 100 Hz."""
 PACE = {"replay-10x": 10.0, "replay-max": math.inf}
 """Of the others it is that of the run."""

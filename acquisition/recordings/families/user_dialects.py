@@ -45,7 +45,7 @@ def dialects() -> Iterator[ColumnFormat]:
             with open_regular_text(path, "utf-8") as file:
                 text = file.read()
         except (OSError, UnicodeError) as error:
-            raise AcquisitionError(f"{path}: cannot be read ({error}); repair or remove it") from error
+            raise AcquisitionError(f"{path}: cannot be read ({error})", "repair or remove it") from error
         yield dialect(str(path), text)
 
 
@@ -66,9 +66,9 @@ def dialect(path: str, text: str) -> ColumnFormat:
     try:
         declared = msgspec.toml.decode(text, type=_Declared)
     except msgspec.ValidationError as error:
-        raise AcquisitionError(f"{path}: {' '.join(str(error).split())}; correct it") from error
+        raise AcquisitionError(f"{path}: {' '.join(str(error).split())}", "correct it") from error
     except msgspec.DecodeError as error:
-        raise AcquisitionError(f"{path}: expected TOML, got {error}; repair or remove it") from error
+        raise AcquisitionError(f"{path}: expected TOML, got {error}", "repair or remove it") from error
     name = Path(path).stem
     headings = [
         Heading(each.name, each.unit, role="time" if each.time else "aside" if each.aside else "channel")

@@ -74,7 +74,9 @@ def make_law(
     laws: tuple[Law, ...] = (*DRAGS, Power())
     ours = {coefficient for law in laws for coefficient in law.parameters}
     if taken := [each for each in parameters if each in QUANTITIES and each not in ours]:
-        raise AnalysisError(f"law {name!r}: coefficient {taken[0]!r} has the name of an estimate; give it another name")
+        raise AnalysisError(
+            f"law {name!r}: coefficient {taken[0]!r} has the name of an estimate", "give it another name"
+        )
     units = {"A0": Unit(1)}
     for each, exponents in parameters.items():
         if not (isinstance(exponents, tuple) and len(exponents) == 2 and all(isinstance(e, Real) for e in exponents)):

@@ -292,7 +292,9 @@ def address_in_network() -> str:
         try:
             probe.connect(ELSEWHERE)
         except OSError as error:
-            raise ProgramError(f"--lan: no network ({error.strerror}); join one, or leave --lan out", SENSOR) from error
+            raise ProgramError(
+                f"--lan: no network ({error.strerror})", "join one, or leave --lan out", exit_code=SENSOR
+            ) from error
         return str(probe.getsockname()[0])
 
 

@@ -55,6 +55,7 @@ CODES: Mapping[str, frozenset[str]] = {
     "stopped": frozenset({"at_rest", "handled", "strongly_damped"}),
     "spring": frozenset({"spring_mass_missing"}),
     "air": frozenset({"air_temperature_missing"}),
+    "described": frozenset(),
     "nothing": frozenset(),
 }
 
@@ -68,6 +69,7 @@ class Record:
     truth: Mapping[str, Truth]  # by the name of the estimate; empty: nothing moves, so any period is wrong
     scene: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     text: bytes | None = None  # the file to be read instead of the arrays
+    track: Mapping[str, Any] = field(default_factory=dict)  # what else is stated of the track: its clock and its sound
 
 
 @dataclass(frozen=True)
@@ -83,8 +85,9 @@ class Kind:
 
     @property
     def codes(self) -> frozenset[str]:
-        """The findings that name it."""
-        return CODES[self.cause] if self.plain else CODES[self.cause] | {"model_misfit"}
+        """The findings that name it; a motion that the models describe is to be right, and no finding excuses it."""
+        described = self.plain or self.cause == "described"
+        return CODES[self.cause] if described else CODES[self.cause] | {"model_misfit"}
 
 
 def kind(
@@ -142,8 +145,14 @@ class Bench:
             "offset": self.rest_m,
             "amplitude": self.motion.amplitude,
             "damping_rate": self.motion.rate,
+            **self.drag(),
         }
         return {name: every[name] for name in names or every}
+
+    def drag(self) -> dict[str, Truth]:
+        """Return the coefficients of the bob's drag by name, those that are zero among them."""
+        bob = self.bob
+        return {"c": bob.c, "n": bob.n} if bob.c else {name: getattr(bob, name) for name in ("mu", "gamma", "beta")}
 
     def record(self, y: F8, *names: str, t: F8 | None = None, **more: Truth) -> Record:
         """Return the record of distances y (n,), m, at the record's own times, or at t."""
