@@ -15,7 +15,7 @@ The packages are listed in the order of the data flow; each imports only from th
     checks/         tests of the record against its own model
     results/        estimates with their budgets, effects, curves
     findings/       what is reported about a run, in words
-    analyse         runs all stages in order; options has its accuracies, and streaming runs it during a recording
+    analyse         runs all stages in order; options has its accuracies
 
 Two rooms beside this path start from its results: several/ compares runs, and simulation/ computes motions with any
 integrator.

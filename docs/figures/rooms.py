@@ -38,7 +38,6 @@ WHAT = {
     "springmass.errors": "exit codes",
     "springmass.layout": "where the parts are",
     "pipeline": "arithmetic, no files",
-    "pipeline.streaming": "while samples arrive",
     "pipeline.analyse": "calls the stages in order",
     "pipeline.closed": "at rest, creeping, two modes",
     "pipeline.analysis": "the result of an analysis",

@@ -2,29 +2,30 @@
 
 from __future__ import annotations
 
-import contextlib
+import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pipeline.errors import AnalysisError
+from acquisition.block import Block
+from acquisition.buffer import SampleBuffer
+from pipeline.errors import TrackError
 from springmass.api.analysing import AnyScene
 from springmass.loading.options import AnalysisOptions
 from springmass.loading.scenes import scene_from
+from springmass.runs.rolling import Rolling
 from springmass.runs.run import Run
 
-FEWEST = 32  # samples before the first analysis
-SAMPLES_RATIO = (
-    1.1  # the next analysis waits for so many times as many samples, so a second of data costs the same throughout
-)
+STREAM_SHARE = 0.025
+"""Largest share of a core for the analyses, of the time that the samples span: a replay is slowed to 40 times life."""
 
 
 class Stream:
     """The estimates of a run so far, from samples that arrive piece by piece.
 
-    The samples are analysed again whenever a tenth more of them have come. A second of data costs the same however
-    long the run is, and the estimates are those that :func:`springmass.analyse` gives for the same samples.
+    The samples are analysed again as often as a fortieth of the time that they span allows, so a second of data costs
+    the same however long the run is. The estimates are those of :func:`springmass.analyse` for the same samples.
 
     Parameters
     ----------
@@ -45,30 +46,28 @@ class Stream:
     """
 
     def __init__(self, scene: AnyScene | None = None, *, accuracy: Any = "fast", law: str | None = None) -> None:
-        self._scene, self._how = scene_from(scene), AnalysisOptions(accuracy=accuracy, law=law)
-        self._t: list[Any] = [np.empty(0)]
-        self._y: list[Any] = [np.empty(0)]
-        self._count, self._due = 0, FEWEST
-        self._run: Run | None = None
+        stated, how = scene_from(scene), AnalysisOptions(accuracy=accuracy, law=law)
+        self._end_s = -math.inf
+        self._rolling = Rolling(
+            lambda block: Run.of((block.t, block.distance), stated, how),
+            SampleBuffer(),
+            share=STREAM_SHARE,
+            now=lambda: self._end_s,
+        )
 
     def push(self, t: ArrayLike, y: ArrayLike) -> Run | None:
         """Take the next samples, times in s and distances in m; return the latest run, None before the first one."""
-        self._t.append(np.atleast_1d(np.asarray(t, np.float64)))
-        self._y.append(np.atleast_1d(np.asarray(y, np.float64)))
-        self._count += self._t[-1].size
-        if self._count >= self._due:
-            self._due = int(self._count * SAMPLES_RATIO) + 1
-            with contextlib.suppress(AnalysisError):  # too few are usable so far; ``finish`` says so
-                self._run = self._analysed()
-        return self._run
+        times, values = (np.atleast_1d(np.asarray(each, np.float64)) for each in (t, y))
+        if times.ndim != 1 or times.shape != values.shape:
+            shapes = f"got {times.shape} and {values.shape}"
+            raise TrackError(f"t and y must be one-dimensional and of one length, {shapes}", "give one time a value")
+        self._rolling.push(Block(0, times, values, np.zeros(times.size, np.uint8)))
+        self._end_s = float(np.max(times, initial=self._end_s, where=np.isfinite(times)))
+        latest = self._rolling.latest()
+        return latest if isinstance(latest, Run) else None
 
     def finish(self) -> Run:
         """Return the run of all samples."""
-        self._run = self._analysed()
-        return self._run
-
-    def _analysed(self) -> Run:
-        self._t, self._y = [np.concatenate(self._t)], [np.concatenate(self._y)]
-        run = Run.of((self._t[0], self._y[0]), self._scene, self._how)
+        run = self._rolling.run()
         _ = run.analysis
         return run

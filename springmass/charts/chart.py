@@ -14,11 +14,13 @@ from pipeline.track import F8
 from pipeline.units import DISPLAY_UNITS, Unit
 from springmass.typeset import page_unit
 
-Role = Literal["data", "law", "other", "rest", "flagged", "band", "mark"]
+Role = Literal["data", "law", "other", "time", "rest", "flagged", "band", "mark"]
 """What a series is; ``looks`` has its colours, dashes and marker."""
 
 MOST_POINTS, MOST_OF_LINE = 12_500, 6_000
 """Largest series that is kept as it is; of a larger one two thirds as many rows remain: the extremes of bins."""
+
+WINDING = 12  # ways from its lowest to its highest value, along all of a line
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,6 +38,12 @@ class Series:
     line: bool = False
     u: F8 | None = None
     why: tuple[str, ...] | None = None
+
+    @property
+    def winds(self) -> bool:
+        """Whether a line goes up and down so often that its dashes would only make moiré: it is drawn solid."""
+        y = self.y[np.isfinite(self.y)]
+        return self.line and y.size > 2 and float(np.abs(np.diff(y)).sum()) > WINDING * float(np.ptp(y))
 
     def at(self, rows: NDArray[np.intp]) -> Series:
         """Return the series with these rows alone."""
@@ -119,7 +127,7 @@ def to_json(chart: Chart) -> dict[str, Any]:
             if x not in xs:
                 xs.append(x)
             entry: dict[str, Any] = {"label": thin.label, "role": thin.role, "line": thin.line}
-            entry |= {"x": xs.index(x), "y": coded(thin.y)}
+            entry |= {"x": xs.index(x), "y": coded(thin.y), **({"winds": True} if thin.winds else {})}
             if thin.u is not None:
                 entry["u"] = coded(thin.u)
             if thin.why is not None:

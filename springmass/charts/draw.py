@@ -45,6 +45,10 @@ def render(chart: Chart, kinds: Sequence[PictureFormat]) -> dict[PictureFormat, 
     """Return a chart as the bytes of a file of every kind."""
     with style():
         figure = figure_of(chart)
+        if (layout := figure.get_layout_engine()) is not None:
+            # Every file would find the same places of the axes again and draw twice for it.
+            layout.execute(figure)
+            figure.set_layout_engine("none")
         return {kind: written(figure, kind) for kind in kinds}
 
 
@@ -129,13 +133,15 @@ def legend(ax: Axes) -> None:
 def draw(panel: Panel, ax: Axes) -> Axes:
     """Draw a panel into axes, in their own style; text from outside is never set as mathematics."""
     low, high = panel.reach()
-    others = list(dict.fromkeys(line.label for line in panel.series if line.role == "other"))
+    labels: dict[str, list[str]] = {}
     named: set[str] = set()
     for i, series in enumerate(each if panel.equal else thinned(each, MOST_OF_DRAWN_LINE) for each in panel.series):
         label = "_" if series.label in named else series.label.replace("$", r"\$")
         named.add(series.label)
-        number = others.index(series.label) if series.role == "other" else 0
-        _draw(ax, series, label, number, (low, high), 1.5 + 0.01 * i)
+        of_role = labels.setdefault(series.role, [])
+        if series.label not in of_role:
+            of_role.append(series.label)
+        _draw(ax, series, label, of_role.index(series.label), (low, high), 1.5 + 0.01 * i)
     if panel.log:
         low = low if low > 0.0 else high * 1e-6
         ax.set_yscale("log")
@@ -149,6 +155,9 @@ def draw(panel: Panel, ax: Axes) -> Axes:
     if panel.names:
         ax.set_xticks(range(1, len(panel.names) + 1), [name.replace("$", r"\$") for name in panel.names])
         ax.tick_params(axis="x", labelrotation=20 if sum(map(len, panel.names)) > 60 else 0)
+    if panel.equal:
+        ax.set_box_aspect(1.0)
+        ax.margins(x=0.05)
     ax.set(xlabel=panel.x_label, ylabel=panel.label)
     return ax
 
@@ -181,9 +190,12 @@ def _draw(ax: Axes, s: Series, label: str, number: int, ends: tuple[float, float
     elif s.line:
         if s.u is not None:
             name = label if s.role == "band" else "_"
-            ax.fill_between(s.x, s.y - s.u, s.y + s.u, color=colour, alpha=0.25, lw=0, label=name, zorder=above)
+            opacities = of_role.get("opacity", (0.25,))
+            shade: dict[str, Any] = {"alpha": opacities[number % len(opacities)], "lw": 0, "zorder": above}
+            ax.fill_between(s.x, s.y - s.u, s.y + s.u, color=colour, label=name, **shade)
         if s.role != "band":
-            lines = [part / 2 for part in dash]
+            lines = [] if s.winds else [part / 2 for part in dash]
+            style |= {"alpha": 0.7} if s.winds else {}
             ax.plot(s.x, s.y, lw=1.2 if s.role != "rest" else 0.8, ls=(0, lines) if lines else "-", **style)
     else:
         marker = {"dot": "o", "ring": "o", "cross": "x"}[of_role["marker"]]

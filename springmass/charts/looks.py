@@ -1,4 +1,4 @@
-"""Colours, dashes and markers in charts: of data, the selected law, other and rejected laws, flagged samples, marks."""
+"""Colours, dashes and markers of data, selected, other and rejected laws, flagged samples, marks and order in time."""
 
 from __future__ import annotations
 
@@ -16,10 +16,18 @@ LOOKS: dict[str, dict[str, Any]] = {
     },
     "rest": {"light": ["#5f6b76"], "dark": ["#a3adb8"], "dash": [[1, 3]], "marker": "dot"},
     "flagged": {"light": ["#b84a00"], "dark": ["#ff9d5c"], "dash": [[]], "marker": "cross"},
-    "band": {"light": ["#0063a0"], "dark": ["#6cb8f0"], "dash": [[]], "marker": "dot"},
+    "band": {"light": ["#0063a0"], "dark": ["#6cb8f0"], "dash": [[]], "marker": "dot", "opacity": [0.2, 0.4]},
+    "time": {
+        "light": ["#440154", "#3f4a8a", "#2d6e8e", "#1f7f79", "#2f7d32", "#6b7300", "#8f6400", "#a84e00"],
+        "dark": ["#fde725", "#c2df23", "#86d549", "#52c569", "#2ab07f", "#3aa6b9", "#74a4e6", "#b79cf0"],
+        "dash": [[]],
+        "marker": "dot",
+    },
     "mark": {"light": ["#a03f78"], "dark": ["#e8a0c8"], "dash": [[4, 4]], "marker": "ring"},
 }
 """Colours on a light and on a dark background, dashes and marker of each role; a role with several takes them in turn.
+
+``opacity`` is that of a filled band, a quarter where it is not given.
 
 Every colour has a contrast of at least 4.5 to 1 on its background, and roles differ by dashes or markers as well.
 """

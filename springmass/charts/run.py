@@ -34,8 +34,8 @@ DETAIL_PERIODS = 8
 PER_PERIOD = 26  # points of a drawn period: a polygon that looks round
 MOST_PERIODS_DRAWN = 460  # of more periods the envelope is drawn, which a screen cannot tell from the motion
 MOST_STRETCHES, FEWEST_WINDOWS = 24, 6
-TURNS_OF_SAMPLES = 24  # more would cover each other
-MOST_TURNS = 230  # of the phase plot: 6000 points, of which none may be left out
+MOST_TURNS = 8  # of the phase plot; more would cover one another
+PER_TURN = 120  # points of a turn of the phase plot
 MOST_SLIDING = 2000  # amplitudes of the classic method, which overlap
 
 
@@ -330,32 +330,30 @@ def motion(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
 
 
 def phase(a: Analysis) -> Chart | None:
-    """Velocity against displacement: the fitted motion, of very many turns every n-th, and recorded velocities."""
+    """Velocity against displacement: turns of the fitted motion spread over the run, and recorded velocities."""
     if not isinstance(a.motion, Oscillation):
         return None
     motion, track, unit = a.motion, a.track, a.track.unit
     factor, period = DISPLAY_UNITS[unit].factor, 2.0 * np.pi / a.motion.phase.angular_frequency.value
-    step = int(np.ceil(motion.cycles.count / MOST_TURNS))
     inside = (a.flags & Quality.OUTSIDE) == 0
     first, end = motion.damping.t0, float(np.nanmax(track.t[inside]))
-    turns = []
-    for start in np.arange(first, end, period * step).tolist():
-        t = np.linspace(start, min(start + period, end), PER_PERIOD)
-        turns.append(np.column_stack(model_motion(motion, t)))
-        turns.append(np.full((int(step > 1), 2), np.nan))  # lifts the pen
-    line = np.concatenate(turns)
-    fastest = 1.1 * float(np.nanmax(np.abs(line[:, 1])))
-    series = [line_of("fitted motion", line[:, 0] * factor, line[:, 1])]
+    turns = max(int((end - first) / period), 1)
+    drawn = np.unique(np.linspace(0, turns - 1, MOST_TURNS).round())
+    series, fastest = [], 0.0
+    for start in (first + period * drawn).tolist():
+        displacement, velocity = model_motion(motion, np.linspace(start, min(start + period, end), PER_TURN))
+        series.append(line_of(f"turn at {start:.3g} s", displacement * factor, velocity, "time"))
+        fastest = max(fastest, 1.1 * float(np.nanmax(np.abs(velocity))))
     if track.velocity is not None:
-        few, turn = int(np.ceil(motion.cycles.count / TURNS_OF_SAMPLES)), np.floor((track.t - first) / period)
-        seen = used_samples(a) & np.isfinite(track.velocity) & (turn >= 0) & (np.mod(turn, few) == 0)
+        turn = np.floor((track.t - first) / period)
+        seen = used_samples(a) & np.isfinite(track.velocity) & np.isin(turn, drawn)
         displacement = (track.y - motion.rest.at(track.t)) * factor
         series.insert(0, Series("samples, velocity as recorded", displacement[seen], track.velocity[seen], "rest"))
     label = rate_label("velocity" if unit == "m" else "derivative", 1, unit)
     x_label = value_label("displacement" if unit == "m" else f"{noun(unit)} from rest", unit)
     panel = Panel(label, tuple(series), 4.4, x_label, equal=True, range=(-fastest, fastest))
-    caption = "Velocity against displacement from rest." + (f" One turn in {step} is drawn." if step > 1 else "")
-    return Chart("phase", "Phase plot", caption, (panel,))
+    some = f" {drawn.size} of {turns} turns are drawn." if drawn.size < turns else ""
+    return Chart("phase", "Phase plot", f"Velocity against displacement from rest.{some}", (panel,))
 
 
 def classic_method(a: Analysis, classic: Classic) -> Chart | None:

@@ -52,7 +52,7 @@ def page(
         state.follow(path)
     else:
         loaded = load(path, reading.options)
-        state.show(view_of(loaded), loaded.scene, loaded.path, reading.options.given())
+        state.show(view_of(loaded), loaded.path, reading.options.given())
 
     def opened(address: str, share: str) -> None:
         lines = [f"page: {address}"]

@@ -36,7 +36,6 @@ class LogFeed:
         header = self._log.header
         if header is None:
             raise NotALog(path, "expected a wire log with a header, got none", "name the log of a recording")
-        self.scene = header.scene
         self._scan = self._log.scan()
         self._sensors = {sensor.channel: sensor for sensor in header.sensors}
         self._series: dict[Part, SensorSamples] = {}
@@ -50,6 +49,7 @@ class LogFeed:
             [f"{sensor.channel}: {sensor.family}" for sensor in header.sensors],
             simulated=header.kind == "simulated",
             calibration=_calibration(header.sensors[0].calibration),
+            scene=header.scene,
             provenance={"sensor": plain(header.sensors[0]), "events": []},
         )
         self._decoder = LogDecoder(self._sensors, self._begin, self._note)
@@ -136,8 +136,7 @@ def view_of(loaded: Loaded) -> View:
         loaded.samples.unit,
         loaded.info.clock,
         simulated=loaded.info.kind == "simulated",
-        recorded=loaded.track,
-        traps=loaded.traps,
+        loaded=loaded,
         ended=True,
     )
     view.series[0].push(loaded.samples)

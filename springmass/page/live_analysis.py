@@ -4,31 +4,24 @@ from __future__ import annotations
 
 import math
 import threading
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from acquisition.recordings.recording import FormatIssue
 from pipeline.analyse import Analysis, Oscillation
-from pipeline.bench.scene import Scene
-from pipeline.errors import PipelineError
 from pipeline.numerics.estimate import Estimate
-from pipeline.track import F8, Track
+from pipeline.track import F8
 from springmass.charts.chart import to_json
 from springmass.charts.run import CHARTS
 from springmass.errors import Error
-from springmass.loading.options import Accuracy, AnalysisOptions
-from springmass.loading.track import between
+from springmass.loading.options import AnalysisOptions
 from springmass.page.view import View, json_of
 from springmass.result.run_json import picked
-from springmass.runs.run import Run, analyse_track
+from springmass.runs.rolling import NotYet, Rolling, analysed, part_of
+from springmass.runs.run import Run
 
-LIVE_TIER: Accuracy = "fast"
-WHOLE_TIER: Accuracy = "standard"
-"""Tiers of the analysis during a recording, and of a complete run; the latter is the default of every command."""
 ANALYSIS_SHARE = 0.025
 """Maximum fraction of a core for analyses of all samples, and as much for those of the last seconds; together 5 %."""
 NOW_S, NOW_SWINGS = 10.0, 8.0
@@ -45,41 +38,23 @@ WANTED = 4e-5
 """Wanted u relative to the period: a little above the u of a 50 ppm crystal, so that it can be reached."""
 
 
-def motion_of(
-    track: Track,
-    scene: Scene,
-    wanted_u_s: float | None = None,
-    traps: Sequence[FormatIssue] = (),
-    *,
-    law: str | None = None,
-    accuracy: Accuracy = LIVE_TIER,
-    charts: bool = False,
-) -> dict[str, Any]:
-    """Analyse samples and return the message about their motion; None wants u(T) to reach 40 ppm of the period."""
-    try:
-        analysis = analyse_track(track, scene, AnalysisOptions(accuracy=accuracy, law=law), traps)
-    except PipelineError as error:
-        return {"type": "motion", "why": str(error), "accuracy": accuracy, "t_s": _end(track)}
-    return _message(analysis, accuracy, wanted_u_s, charts=charts)
-
-
-def _end(track: Track) -> float | None:
-    return float(np.nanmax(track.t)) if np.isfinite(track.t).any() else None
-
-
-def _message(analysis: Analysis, accuracy: str, wanted_u_s: float | None, *, charts: bool) -> dict[str, Any]:
-    motion, unit = analysis.motion, analysis.track.unit
+def motion_message(found: Run | NotYet, wanted_u_s: float | None = None, *, charts: bool = False) -> dict[str, Any]:
+    """Return the message about the motion; None wants u(T) to reach 40 ppm of the period."""
+    if isinstance(found, NotYet):
+        return {"type": "motion", "why": found.why}
+    analysis = found.analysis
+    motion, times = analysis.motion, analysis.track.t
     graver = [f for f in analysis.findings if f.severity != "info"]
     message: dict[str, Any] = {
         "type": "motion",
         "why": "",
-        "accuracy": accuracy,
-        "t_s": _end(analysis.track),
+        "accuracy": found.how.accuracy,
+        "t_s": float(np.nanmax(times)),
         "findings": [picked(f, ("code", "severity", "message", "advice")) for f in graver],
     }
     shown = {name: analysis.estimates[name] for name in NAMES if name in analysis.estimates}
     if isinstance(motion, Oscillation):
-        shown |= _amplitude_now(motion, unit)
+        shown |= _amplitude_now(motion, analysis.track.unit)
         message |= {
             "law": motion.damping.selected,
             "stated_law": motion.damping.stated,
@@ -176,6 +151,15 @@ def _latest_fit(motion: Oscillation) -> dict[str, Any]:
     }
 
 
+def _renewed(message: Mapping[str, Any], found: Run | NotYet) -> dict[str, Any]:
+    """Return a message without its charts, with the current amplitude of a newer analysis."""
+    recent = motion_message(found)
+    newer = recent.get("estimates", {}).get("amplitude_now")
+    renewed = {} if newer is None else {"amplitude_now": {**newer, "t_s": recent["t_s"]}}
+    fields = {name: x for name, x in message.items() if name != "charts"}
+    return {**fields, "estimates": {**message["estimates"], **renewed}}
+
+
 class Watcher:
     """Analyses the first sensor's samples in a thread, as often as its share of a core allows.
 
@@ -185,16 +169,16 @@ class Watcher:
     this thread.
     """
 
-    def __init__(
-        self, view: View, scene: Mapping[str, Any] | None, wanted_u_s: float | None, law: str | None = None
-    ) -> None:
-        self._view = view
-        self._scene = Scene.from_mapping(scene or {}, where="the recording's scene")
-        self._wanted_u_s, self._law = wanted_u_s, law
+    def __init__(self, view: View, wanted_u_s: float | None, law: str | None = None) -> None:
+        live, samples = AnalysisOptions(accuracy="fast", law=law), view.series[0]
+        self._whole = AnalysisOptions(law=law)  # the accuracy of every command
+        self._wanted_u_s = wanted_u_s
+        self._all = Rolling(lambda block: view.live_run(block, live), samples, share=ANALYSIS_SHARE)
+        self._recent = Rolling(lambda block: view.live_run(block, live), samples, share=ANALYSIS_SHARE)
+        self._run = None if view.loaded is None else Run(view.loaded, how=self._whole)
         self._closed = False
         self._wake = threading.Event()
         self._complete: Path | None = None
-        self._run: Run | None = None
         self.text = json_of({"type": "motion", "count": 0, "why": "no analysis so far"})
         self.update = ""
         threading.Thread(target=self._loop, name="springmass-page-analysis", daemon=True).start()
@@ -206,65 +190,41 @@ class Watcher:
 
     def complete(self, path: Path) -> None:
         """From now on, analyse the run file, as every command does, instead of the samples of its log."""
-        if path != self._complete:
-            self._complete = path
-            self._wake.set()
+        self._complete = path
+        self._wake.set()
 
     def region(self, low: float, high: float) -> str:
         """Return the message about the motion between two times as JSON."""
-        return json_of({**self._between(low, high), "type": "region", "from": low, "to": high})
+        run = self._all.run() if self._run is None else self._run
+        part = analysed(part_of(run, low, high))
+        return json_of({**motion_message(part, self._wanted_u_s), "type": "region", "from": low, "to": high})
 
-    def _between(self, low: float = -math.inf, high: float = math.inf, *, charts: bool = False) -> dict[str, Any]:
-        track, scene, traps = self._view.track(), self._scene, self._view.traps
-        if self._run is not None:
-            track, scene, traps = self._run.loaded.track, self._run.scene, self._run.loaded.traps
-        accuracy = LIVE_TIER if self._run is None and self._view.recorded is None else WHOLE_TIER
-        track = between(track, low, high)
-        return motion_of(track, scene, self._wanted_u_s, traps, law=self._law, accuracy=accuracy, charts=charts)
-
-    def _motion(self) -> dict[str, Any]:
-        """Analyse all samples, or the run file once it is complete."""
-        if self._complete is None:
-            return self._between(charts=True)
+    def _of_complete(self) -> Run | NotYet:
+        """Return the analysed run of the run file once it is complete."""
         try:
-            run = Run.of(self._complete, how=AnalysisOptions(accuracy=WHOLE_TIER, law=self._law))
+            if self._run is None:
+                self._run = Run.of(self._complete, how=self._whole)
         except Error as error:
-            return {"type": "motion", "why": str(error), "accuracy": WHOLE_TIER}
-        self._run = run
-        return _message(run.analysis, WHOLE_TIER, self._wanted_u_s, charts=True)
-
-    def _updated(self, message: dict[str, Any], swing_s: float) -> dict[str, Any]:
-        """Analyse only the last seconds, and return a message with their amplitude and without its charts."""
-        last_s = float(self._view.series[0].block().t[-1])
-        estimates = self._between(last_s - max(NOW_S, NOW_SWINGS * swing_s)).get("estimates", {})
-        newer = {name: {**x, "t_s": last_s} for name, x in estimates.items() if name == "amplitude_now"}
-        fields = {name: x for name, x in message.items() if name != "charts"}
-        return {**fields, "estimates": {**message["estimates"], **newer}}
+            return NotYet(str(error))
+        return analysed(self._run)
 
     def _loop(self) -> None:
-        count, seen, is_complete, due_s, swing_s = 0, 0, False, 0.0, 0.0
-        wait_s, last_cost_s = 0.0, 0.0
-        message: dict[str, Any] = {}
+        """Renew the messages until the run is complete."""
+        count, message = 0, dict[str, Any]()
         while not self._closed:
-            self._wake.wait(wait_s)
-            self._wake.clear()
-            wait_s = LEAST_WAIT_S
-            samples, complete = len(self._view.series[0]), self._complete is not None
-            if self._closed or (samples == seen and complete == is_complete) or is_complete:
-                continue
-            start_s = time.thread_time()  # CPU time, without waiting for a core that other programs use
+            whole = self._run is not None or self._complete is not None
             try:
-                if complete or time.monotonic() >= due_s:
-                    seen, is_complete, count = samples, complete, count + 1
-                    message = {**self._motion(), "count": count}
-                    swing_s = message.get("estimates", {}).get("period", {}).get("value", 0.0)
+                if whole or self._all.due():
+                    count += 1
+                    found = self._of_complete() if whole else self._all.latest()
+                    message = {**motion_message(found, self._wanted_u_s, charts=True), "count": count}
                     self.update, self.text = "", json_of(message)
-                    cost_s = time.thread_time() - start_s
-                    # An analysis that first loads a library takes longer; the next one need not wait for that.
-                    due_s = time.monotonic() + min(cost_s, last_cost_s) / ANALYSIS_SHARE
-                    last_cost_s = cost_s
-                elif swing_s:
-                    self.update = json_of(self._updated(message, swing_s))
-                    wait_s = max(wait_s, (time.thread_time() - start_s) / ANALYSIS_SHARE)
+                elif (period := message.get("estimates", {}).get("period")) and self._recent.due():
+                    recent = self._recent.latest(max(NOW_S, NOW_SWINGS * period["value"]))
+                    self.update = json_of(_renewed(message, recent))
             except Exception as error:  # a defect of the analysis is shown, and the samples are still displayed
                 self.text = json_of({"type": "motion", "count": count, "why": f"{type(error).__name__}: {error}"})
+            if whole:
+                break
+            self._wake.wait(LEAST_WAIT_S)
+            self._wake.clear()

@@ -140,10 +140,10 @@ class PageState:
         self._folder: Path | None = None
         self.recorder_states: queue.SimpleQueue[Mapping[str, Any]] = queue.SimpleQueue()
 
-    def show(self, view: View, scene: Mapping[str, Any] | None, path: Path, read: Mapping[str, Any]) -> None:
+    def show(self, view: View, path: Path, read: Mapping[str, Any]) -> None:
         """Show a complete run, which was read with these options."""
         self._folder = path.parent
-        self._lay(view, scene)
+        self._lay(view)
         chosen = {name: str(read[name]) for name in ("run", "channel") if name in read}
         self.after = RunActions(path, ours=False, words=self._words_of({**read, "law": self._law}), chosen=chosen)
 
@@ -154,7 +154,7 @@ class PageState:
         if self._feed is not None:
             self._feed.close()
         self._feed, self._log, self._folder = feed, log, log.parent
-        self._lay(feed.view, feed.scene)
+        self._lay(feed.view)
 
     def poll(self) -> None:
         """Read new samples and states; only the server's thread may call this."""
@@ -164,7 +164,7 @@ class PageState:
             return
         self._feed.poll()
         if self.view is not self._feed.view and self.after is None:
-            self._lay(self._feed.view, self._feed.scene)
+            self._lay(self._feed.view)
         if self.controls is None and self._feed.view.ended and self.watcher is not None:
             self.watcher.complete(self._log)
 
@@ -222,8 +222,8 @@ class PageState:
             if self.watcher is not None:
                 self.watcher.complete(Path(message["run"]))
 
-    def _lay(self, view: View, scene: Mapping[str, Any] | None) -> None:
+    def _lay(self, view: View) -> None:
         if self.watcher is not None:
             self.watcher.close()
         self.view = view
-        self.watcher = Watcher(view, scene, self._wanted_u_s, self._law)
+        self.watcher = Watcher(view, self._wanted_u_s, self._law)

@@ -6,6 +6,7 @@ import json
 import secrets
 import struct
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -13,10 +14,11 @@ import numpy as np
 
 from acquisition.block import Block, ClockKind, SourceInfo
 from acquisition.buffer import SampleBuffer
-from acquisition.recordings.recording import FormatIssue
-from pipeline.track import Track
-from springmass.loading.track import to_track
+from springmass.loading.loaded import Loaded
+from springmass.loading.options import AnalysisOptions
 from springmass.result.run_json import plain
+from springmass.runs.rolling import live_run
+from springmass.runs.run import Run
 from storage.wire_log.wire_samples import Origin
 
 PROTOCOL_VERSION = 2  # of the messages
@@ -54,8 +56,8 @@ class View:
     """A run as the page shows it, with one series per sensor.
 
     ``session`` differs between runs, so that a page that reconnects to another run begins anew. ``zero`` has the rest
-    position and noise measured before the run. ``recorded`` is the track of a saved run; ``info`` and ``provenance``
-    are those of a run that is being recorded.
+    position and noise measured before the run. ``loaded`` is a saved run; ``info``, ``scene`` and ``provenance`` are
+    those of a run that is being recorded.
     """
 
     source: Literal["LIVE", "REPLAY"]
@@ -74,21 +76,19 @@ class View:
     notes: deque[str] = field(default_factory=lambda: deque(maxlen=SHOWN_NOTES))
     ended: bool = False
     error: str = ""
-    recorded: Track | None = None
+    loaded: Loaded | None = None
     info: SourceInfo | None = None
+    scene: Mapping[str, Any] | None = None
     provenance: dict[str, Any] = field(default_factory=dict)
-    traps: tuple[FormatIssue, ...] = ()
     zero: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.series = self.series or [SensorSamples() for _ in self.sensors]
 
-    def track(self) -> Track:
-        """Return the first sensor's samples so far, in the form for an analysis."""
-        if self.recorded is not None:
-            return self.recorded
+    def live_run(self, samples: Block, how: AnalysisOptions) -> Run:
+        """Return samples of the first sensor of a run that is being recorded, to be analysed."""
         info = self.info or SourceInfo("live", self.name, self.rate_hz, clock=self.clock)
-        return to_track(self.series[0].block(), info, recorded_format="wire", provenance=self.provenance)
+        return live_run(samples, info, self.scene, self.provenance, how)
 
     def hello(self, *, controls: bool) -> dict[str, Any]:
         """Return the first message to a viewer."""

@@ -106,7 +106,9 @@ class Run(Mapping[str, Value]):
     @cached_property
     def analysis(self) -> Analysis:
         """The analysis; its findings include those of the reader."""
-        LOG.debug(f"analysed: {self.name} at {self.how.accuracy}, with a scene that states {stated_keys(self.scene)}")
+        if self.name:  # without one, the samples are arrays, or those so far of a recording
+            with_scene = f"with a scene that states {stated_keys(self.scene)}"
+            LOG.debug(f"analysed: {self.name} at {self.how.accuracy}, {with_scene}")
         return analyse_track(self.loaded.track, self.scene, self.how, self.loaded.traps)
 
     @cached_property

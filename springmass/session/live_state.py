@@ -16,16 +16,14 @@ import numpy as np
 from acquisition.block import I8, Block, Flag
 from acquisition.decoders.sensor import Sensor
 from acquisition.live.decoding import SensorChain
-from pipeline.options import options_for
-from pipeline.streaming import LiveMotion, MotionAccumulator, NotYet
+from springmass.runs.rolling import NotYet, Rolling
+from springmass.runs.run import Run
 from storage.recorder import RecorderStatus
 from storage.wire_log.wire_samples import Origin
 
 SECOND_NS = 1_000_000_000
 USELESS_S = 0.8
 """Time in s after which a lack of targets or of changes is a trouble; the display's first turn can report it."""
-MOTION_EVERY_NS = 1_900_000_000
-"""Interval between analyses of the motion, about two progress lines or one swing; each takes a few milliseconds."""
 ROOM_BYTES = 512 << 20
 """Address space for the analysis: 230 MiB was measured on two cores, and each further core takes about 40 MiB."""
 
@@ -54,7 +52,7 @@ class Progress:
     missing: int  # of all sensors, as are the gaps
     gaps: int
     rate_hz: float  # samples from the first sensor in the last second
-    motion: Callable[[], LiveMotion | NotYet]  # of the first sensor; it takes milliseconds
+    motion: Callable[[], Run | NotYet]  # of the first sensor's last seconds; it takes milliseconds
     status: RecorderStatus | None
     disk_free_bytes: int | None
     waiting: bool  # for its trigger
@@ -109,11 +107,14 @@ class Usefulness:
 
 
 class LiveState:
-    """The state derived from the samples so far; ``origin`` is the host time at the run's t = 0."""
+    """The state derived from the samples so far; ``origin`` is the host time at the run's t = 0.
 
-    def __init__(self, rate_hz: float) -> None:
+    ``rolling`` makes the rolling analysis of a channel.
+    """
+
+    def __init__(self, rolling: Callable[[int], Rolling]) -> None:
         self.missing = 0
-        self._rate_hz = rate_hz
+        self._rolling = rolling
         self._has_room = False
         self.useful: dict[int, Usefulness] = {}
         self.origin = Origin()
@@ -121,10 +122,7 @@ class LiveState:
 
     def _begin(self, channel: int) -> None:
         self._channel = channel
-        # The fast tier takes a third of the time of the standard tier used for the run; period and amplitude agree.
-        self._motion = MotionAccumulator(self._rate_hz, options=options_for("fast"))
-        self._found: LiveMotion | NotYet = NotYet("no samples so far")
-        self._found_ns = 0
+        self._motion = self._rolling(channel)
         self._stamps: deque[I8] = deque()
         self._last_ns: int | None = None
 
@@ -141,21 +139,19 @@ class LiveState:
             self.useful.setdefault(channel, Usefulness()).push(block)
             if channel != self._channel or not len(block):
                 continue
-            self._motion.push(block.t, block.distance, block.flags)
+            self._motion.push(block)
             if channel == 0:
                 self.origin.push(block)
             if block.host_ns is not None:
                 self._stamps.append(block.host_ns)
                 self._last_ns = int(block.host_ns[-1])
 
-    def motion(self, now_ns: int) -> LiveMotion | NotYet:
-        """Return the first sensor's motion, calculated again if the last result is old enough."""
+    def motion(self) -> Run | NotYet:
+        """Return the run of the first sensor's last seconds, or why there is none yet."""
         if not self._has_room:
             demand_room()
             self._has_room = True
-        if isinstance(self._found, NotYet) or now_ns - self._found_ns >= MOTION_EVERY_NS:
-            self._found, self._found_ns = self._motion.value(), now_ns
-        return self._found
+        return self._motion.latest()
 
     def silent_s(self, now_ns: int) -> float:
         """Return the time since the first sensor's last reading, s; 0 before the first reading."""

@@ -20,13 +20,16 @@ from typing import Any
 import numpy as np
 
 from acquisition.block import Block
+from acquisition.buffer import SampleBuffer
 from acquisition.clock import Clock
 from acquisition.events import RunEnded, Triggered, Zeroed
 from acquisition.live.calibration import StillPoint, against_ruler, from_still
 from acquisition.live.reader import PortLine, PortReader
-from pipeline.streaming import LiveMotion, NotYet
 from springmass import __version__
 from springmass.errors import SENSOR, ProgramError
+from springmass.loading.options import AnalysisOptions
+from springmass.runs.rolling import FEWEST, NotYet, Rolling, live_run
+from springmass.runs.run import Run
 from springmass.session.failures import Failures, Worker
 from springmass.session.live_state import SECOND_NS, LiveState, Progress, free_bytes, trouble_of
 from springmass.session.reads import Tee
@@ -35,6 +38,7 @@ from springmass.session.trigger import Disarmed, Trigger, Watch
 from springmass.stops import EndReason, Stops
 from storage.errors import StorageError, WriteFailed
 from storage.recorder import Recorder, RecorderStatus
+from storage.schema import plain
 from storage.wire_log.records import LogHeader
 from storage.wire_log.scanning import LogContents
 
@@ -43,6 +47,11 @@ HEARD = 3  # number of readings after which a sensor counts as heard
 LOOK_FOR_MARKS_S, LOOK_FOR_TRIGGER_S = 0.2, 0.05
 HELD_BLOCKS = 1000  # maximum number of blocks kept for the display before the run begins
 BYTES_PER_READ = 64  # log bytes per reading, for the check of the disk space
+SHOWN_S = 10.0  # duration of the samples whose period and amplitude the progress line shows
+LIVE = AnalysisOptions(accuracy="fast")
+"""The fast tier takes a third of the time of the standard tier, with which the run is analysed."""
+MOTION_SHARE = 0.007
+"""Share of a core for the shown motion, a new one every other second; a recording may take 3 % with all else."""
 
 PortBlocks = Sequence[tuple[int, Block]]
 
@@ -320,7 +329,7 @@ class Session:
 
         A display that is still busy skips a turn, and shows the latest state at its next one.
         """
-        self.shown = shown = LiveState(self._chains[0].timebase.rate_hz)
+        self.shown = shown = LiveState(self._rolling)
         worker = Worker("display", lambda error: self.failures.note("display", error))
 
         def show(take: Callable[[], PortBlocks], *, tick: bool = True) -> None:
@@ -339,15 +348,25 @@ class Session:
             worker.close("the last turn has not ended")
             self.failures.tell = None  # the log takes no more events
 
+    def _rolling(self, channel: int) -> Rolling:
+        """Return the analysis of the last seconds of a channel of the first port."""
+        chain, entry = self._chains[channel], self.sensors[0].entry(0)
+        return Rolling(
+            lambda block: live_run(block, chain.info(entry.port), self._scene, {"sensor": plain(entry)}, LIVE),
+            SampleBuffer(max(int(chain.timebase.rate_hz * SHOWN_S), FEWEST)),
+            share=MOTION_SHARE,
+            now=lambda: self._clock.now_ns() * 1e-9,
+        )
+
     def _progress(
         self, shown: LiveState, start_ns: int, now_ns: int, recorder: Recorder | None, *, tick: bool
     ) -> Progress:
         """Return the progress of the recording; without a recorder, it is waiting for its trigger."""
 
-        def motion() -> LiveMotion | NotYet:
+        def motion() -> Run | NotYet:
             """Return the motion, or the reason why its calculation failed; the rest of the line is not affected."""
             try:
-                return shown.motion(now_ns)
+                return shown.motion()
             except BaseException as error:
                 self.failures.note("analysis", error)
                 return NotYet(f"no motion shown ({type(error).__name__})")

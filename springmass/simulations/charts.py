@@ -71,7 +71,7 @@ def _both(
     for (_, words), run in zip(EULERS, runs.eulers, strict=True):
         x, y = values(run, len(run.y))
         beside_x, beside_y = values(runs.exact, len(run.y))
-        lines = (Series(words, x, y, "other" if measured else "data", True), line_of(runs.words, beside_x, beside_y))
+        lines = (line_of(runs.words, beside_x, beside_y), Series(words, x, y, "other" if measured else "data", True))
         grows = log and float(np.min(y)) > 0.0 and float(np.max(y)) > 20.0 * float(np.max(beside_y))
         height, x_label = (3.6, "displacement y / mm") if equal else (2.4, "time / s")
         # Beside points an axis would not show all of a line that leaves them.

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from pipeline.streaming import LiveMotion, NotYet
+from pipeline.analyse import Oscillation
+from springmass.runs.rolling import NotYet
 from springmass.session.live_state import Progress, TroubleKind
 from springmass.terminal.console import Console
 from springmass.terminal.style import PLAIN, TerminalStyle, concise, shown
@@ -61,11 +62,13 @@ def _parts(progress: Progress, style: TerminalStyle) -> list[str]:
     # On a terminal the first analysis, which loads its libraries, must not delay troubles and keys.
     listening = style.terminal and progress.seconds < FIRST_MOTION_S
     motion = NotYet("listening") if listening else progress.motion()
-    if isinstance(motion, LiveMotion):
-        form = concise if style.terminal else shown
-        parts += [f"T {form(motion.period, style)}", f"A {form(motion.amplitude, style)}"]
-    else:
+    if isinstance(motion, NotYet):
         parts.append(motion.why)
+    elif isinstance(oscillation := motion.analysis.motion, Oscillation):
+        form, estimates = concise if style.terminal else shown, motion.analysis.estimates
+        parts += [f"T {form(estimates['period'], style)}", f"A {form(estimates['amplitude'], style)}"]
+    else:
+        parts.append(oscillation.why)
     parts.append(f"{progress.rate_hz:.0f} Hz")
     parts.append(f"{progress.missing} missing" + (f", {progress.gaps} gaps" if progress.gaps else ""))
     if progress.status is not None:

@@ -42,8 +42,8 @@ PATCHES = {
 def patch(body: str) -> str:
     """Return Python that has the live analysis do something else."""
     return (
-        "import threading\nfrom pipeline.streaming import MotionAccumulator\n"
-        f"def value(self):\n    {body}\nMotionAccumulator.value = value"
+        "import threading\nfrom springmass.runs.rolling import Rolling\n"
+        f"def latest(self):\n    {body}\nRolling.latest = latest"
     )
 
 

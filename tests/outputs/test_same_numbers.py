@@ -99,7 +99,7 @@ def compare_all(path: Path, answers: Mapping[str, Any], folder: Path, accuracy: 
 
     if accuracy == "standard":  # a complete run on the page
         loaded = sm.load(path, **answers).loaded
-        watcher = Watcher(view_of(loaded), loaded.scene, None)
+        watcher = Watcher(view_of(loaded), None)
         try:
             message = json.loads(watcher.region(-math.inf, math.inf))
         finally:

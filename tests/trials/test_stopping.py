@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.bench.scene import Scene
-from pipeline.track import Track
-from springmass.page.live_analysis import motion_of
+from acquisition.block import Block, SourceInfo
+from springmass.loading.options import AnalysisOptions
+from springmass.page.live_analysis import motion_message
+from springmass.runs.rolling import analysed, live_run
 from tests.synthetic import LAW_TRUTHS, Truth, times
 
 TRIALS = int(os.environ.get("SPRINGMASS_TRIALS", "12"))
@@ -43,8 +44,9 @@ def looks(seed: int) -> list[tuple[float, dict[str, Any]]]:
     messages = []
     for end in LOOKS_S:
         n = round(end * RATE_HZ)
-        track = Track(t[:n], y[:n], np.zeros(n, np.uint8), RATE_HZ, clock="device")
-        messages.append((float(end), motion_of(track, Scene())))
+        samples, info = Block(0, t[:n], y[:n], np.zeros(n, np.uint8)), SourceInfo("live", "", RATE_HZ, clock="device")
+        run = live_run(samples, info, None, {}, AnalysisOptions(accuracy="fast"))
+        messages.append((float(end), motion_message(analysed(run))))
         if messages[-1][1].get("stop", {}).get("more_s") == 0.0:
             break
     return messages

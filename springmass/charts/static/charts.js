@@ -3,7 +3,7 @@
 // springmass/charts/chart.py makes it: panels of series, each with a role. uPlot draws the axes, this script the series.
 
 // LOOKS is the table in springmass/charts/looks.py, which draws files too; the script that it makes stands before this one.
-const RANK = { data: 0, law: 1, other: 2, rest: 3, flagged: 4, band: 5, mark: 6 }, MANY = 2000, ZOOM = 0.5, PAN = 0.25, FONT = "system-ui, sans-serif";
+const RANK = { data: 0, law: 1, other: 2, time: 2, rest: 3, flagged: 4, band: 5, mark: 6 }, MANY = 2000, ZOOM = 0.5, PAN = 0.25, FONT = "system-ui, sans-serif";
 
 // Light text means a dark background, whatever the page takes its colours from.
 function isDark(box) {
@@ -11,8 +11,17 @@ function isDark(box) {
   return 0.3 * r + 0.6 * g + 0.1 * b > 128;
 }
 function lookOf(role, i, dark) {
-  const { dash, marker, ...colours } = LOOKS[role], all = colours[dark ? "dark" : "light"];
-  return { colour: all[i % all.length], dash: dash[i % dash.length], marker };
+  const { dash, marker, opacity = [0.25], ...colours } = LOOKS[role], all = colours[dark ? "dark" : "light"];
+  return { colour: all[i % all.length], dash: dash[i % dash.length], opacity: opacity[i % opacity.length], marker };
+}
+// The look of each series of a panel: series of one role with different labels take the looks of the role in turn.
+function looksOf(panel, dark) {
+  const numbers = new Map(), counts = {};
+  return panel.series.map((s) => {
+    const name = `${s.role} ${s.label}`;
+    if (!numbers.has(name)) { counts[s.role] = (counts[s.role] || 0) + 1; numbers.set(name, counts[s.role] - 1); }
+    return lookOf(s.role, numbers.get(name), dark);
+  });
 }
 
 function decoded(chart) {
@@ -92,9 +101,19 @@ class Panel {
   size() { return this.more.size || { width: Math.max(this.box.clientWidth, 200), height: Math.max(this.box.clientHeight, 80) }; }
   visible() { return this.panel.series.filter((s) => !this.more.hidden.has(s.label)); }
 
+  // A panel of residuals shows those of the chosen x in its whole height.
   reach() {
-    const [low, high] = this.panel.range || [0.1, 1];
+    const [low, high] = (this.panel.zero && this.more.range && this.residuals(...this.more.range)) || this.panel.range || [0.1, 1];
     return this.log && !(low > 0) ? [1e-3 * high, high] : [low, high];
+  }
+
+  residuals(from, to) {
+    let most = 0;
+    for (const s of this.visible()) {
+      if (s.role !== "data" && s.role !== "band") continue;
+      for (let i = 0; i < s.x.length; i++) if (s.x[i] >= from && s.x[i] <= to && known(s.y[i])) most = Math.max(most, Math.abs(s.y[i]) + (s.role === "band" && known(s.u[i]) ? s.u[i] : 0));
+    }
+    return most > 0 && [-1.1 * most, 1.1 * most];
   }
 
   // With equal axes, one unit of x is as long as that part of y which the motion reaches at the same time.
@@ -155,16 +174,14 @@ class Panel {
     ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
     ctx.clip();
     if (this.panel.zero) { ctx.fillStyle = lookOf("rest", 0, dark).colour; ctx.fillRect(bbox.left, to(0) - px / 2, bbox.width, px); }
-    let others = 0;
-    const numbers = new Map();
-    for (const s of this.panel.series) {
-      if (s.role === "other" && !numbers.has(s.label)) numbers.set(s.label, others++);
+    const looks = looksOf(this.panel, dark);
+    for (const [i, s] of this.panel.series.entries()) {
       if (this.more.hidden.has(s.label)) continue;
-      const look = lookOf(s.role, numbers.get(s.label) || 0, dark);
+      const look = looks[i];
       ctx.strokeStyle = ctx.fillStyle = look.colour;
       if (s.role === "mark") paintMarks(tools, s, look);
       else if (s.line || (this.more.joined && s.role === "data" && !s.u)) {
-        if (s.u) paintBand(tools, s);
+        if (s.u) paintBand(tools, s, look);
         if (s.role !== "band") paintLine(tools, s, look, this.panel.series.length > 1 || s.role !== "data");
       } else paintPoints(tools, s, look, this.log);
     }
@@ -201,9 +218,9 @@ function nearest(x, value) {
   return low > 0 && value - x[low - 1] < x[low] - value ? low - 1 : low;
 }
 
-function paintBand({ ctx, at, to, log }, s) {
+function paintBand({ ctx, at, to, log }, s, look) {
   ctx.save();
-  ctx.globalAlpha = 0.25;
+  ctx.globalAlpha = look.opacity;
   for (let i = 0; i < s.x.length;) {
     while (i < s.x.length && !known(s.y[i])) i += 1;
     const first = i;
@@ -215,9 +232,13 @@ function paintBand({ ctx, at, to, log }, s) {
   ctx.restore();
 }
 
+// A line that goes up and down all the time is solid, and lets what lies beneath it through.
+const dashOf = (s, look, px) => (s.winds ? [] : look.dash.map((length) => length * px));
 function paintLine({ ctx, at, to, px }, s, look, wide) {
+  ctx.save();
   ctx.lineWidth = (wide && s.role !== "data" ? 1.4 : 1) * px;
-  ctx.setLineDash(look.dash.map((length) => length * px));
+  ctx.setLineDash(dashOf(s, look, px));
+  if (s.winds) ctx.globalAlpha = 0.7;
   ctx.beginPath();
   let up = true;
   for (let i = 0; i < s.x.length; i++) {
@@ -226,7 +247,7 @@ function paintLine({ ctx, at, to, px }, s, look, wide) {
     up = false;
   }
   ctx.stroke();
-  ctx.setLineDash([]);
+  ctx.restore();
 }
 
 function paintPoints({ plot, ctx, bbox, at, to, px }, s, look) {
@@ -308,25 +329,25 @@ function makeBox(name, parent) {
   return box;
 }
 
-// Entries of a legend: each label of a panel with several series, once.
-function entriesOf(chart, dark) {
-  const entries = new Map();
-  for (const panel of chart.panels) {
-    let others = 0;
-    if (new Set(panel.series.map((s) => s.label)).size < 2) continue;
-    for (const s of panel.series) {
-      if (entries.has(s.label)) continue;
-      entries.set(s.label, { label: s.label, role: s.role, look: lookOf(s.role, s.role === "other" ? others++ : 0, dark), line: s.line, band: s.role === "band" });
-    }
-  }
-  return [...entries.values()].sort((a, b) => RANK[a.role] - RANK[b.role]);
+// Entries of each panel's legend, each label once; a single series needs none, and a panel that shows nothing else than
+// one above it in the same looks has none of its own.
+function legendsOf(chart, dark) {
+  const shown = new Set();
+  return chart.panels.map((panel) => {
+    const entries = new Map(), looks = looksOf(panel, dark);
+    for (const [i, s] of panel.series.entries()) if (!entries.has(s.label)) entries.set(s.label, { label: s.label, role: s.role, look: looks[i], line: s.line, winds: s.winds, band: s.role === "band" });
+    const names = [...entries.values()].map(({ label, role, look }) => `${label} ${role} ${look.colour} ${look.dash}`);
+    if (entries.size < 2 || names.every((name) => shown.has(name))) return [];
+    for (const name of names) shown.add(name);
+    return [...entries.values()].sort((a, b) => RANK[a.role] - RANK[b.role]);
+  });
 }
 function drawKey(ctx, entry, x, y, px) {
   ctx.strokeStyle = ctx.fillStyle = entry.look.colour;
   ctx.lineWidth = 1.6 * px;
-  if (entry.band) { ctx.globalAlpha = 0.3; ctx.fillRect(x, y - 4 * px, 24 * px, 8 * px); ctx.globalAlpha = 1; return; }
+  if (entry.band) { ctx.globalAlpha = entry.look.opacity; ctx.fillRect(x, y - 4 * px, 24 * px, 8 * px); ctx.globalAlpha = 1; return; }
   if (!entry.line) { drawMarker(ctx, entry.look.marker, x + 12 * px, y, 2.6 * px); return; }
-  ctx.setLineDash(entry.look.dash.map((length) => length * px));
+  ctx.setLineDash(dashOf(entry, entry.look, px));
   ctx.beginPath();
   ctx.moveTo(x, y);
   ctx.lineTo(x + 24 * px, y);
@@ -347,14 +368,16 @@ class Chart {
     this.bar = makeBox("bar", box);
     this.bar.setAttribute("role", "toolbar");
     this.bar.ariaLabel = "zoom and view";
-    this.legend = makeBox("legend", box);
     this.value = document.createElement("output");
     this.value.className = "value";
-    this.hint = this.value.textContent = "Drag: zoom. Shift and drag: move. Double-click: all.";
+    this.hint = this.value.textContent = matchMedia("(hover: none)").matches ? "Tap: read a value. Buttons: zoom and move." : "Drag: zoom. Shift and drag: move. Double-click: all.";
     const group = { left: 0 }, more = { hidden: this.hidden, group, joined: false, keep: true };
+    this.legends = [];
     this.panels = chart.panels.map((panel, i) => {
-      const bare = isBare(chart, i), place = makeBox("panel", box);
+      const bare = isBare(chart, i), legend = makeBox("legend", box), place = makeBox("panel", box);
+      this.legends.push(legend);
       place.style.setProperty("--height", `${heightOf(chart, i)}px`);
+      if (panel.equal) place.style.maxWidth = `${heightOf(chart, i) + 40}px`;
       place.setAttribute("role", "img");
       place.ariaLabel = `${chart.title}: ${panel.label} against ${panel.x_label}`;
       const hooks = { setSelect: [(plot) => this.select(plot, panel.x_label)], setCursor: [() => { if (this.over === i) this.value.textContent = this.panels[i].read() || this.hint; }] };
@@ -392,14 +415,17 @@ class Chart {
   redraw(axes = false) { for (const panel of this.panels) panel.plot.redraw(false, axes); }
 
   showLegend() {
-    this.legend.replaceChildren(...entriesOf(this.chart, isDark(this.box)).map((entry) => {
-      const button = this.toggle(entry.label, !this.hidden.has(entry.label), (on) => { if (on) this.hidden.delete(entry.label); else this.hidden.add(entry.label); this.redraw(); });
-      const key = document.createElement("canvas"), px = devicePixelRatio;
-      [key.width, key.height] = [24 * px, 12 * px];
-      drawKey(key.getContext("2d"), entry, 0, 6 * px, px);
-      button.prepend(key);
-      return button;
-    }));
+    for (const [i, entries] of legendsOf(this.chart, isDark(this.box)).entries()) this.legends[i].replaceChildren(...entries.map((entry) => this.entry(entry)));
+  }
+
+  // An entry of a legend is a button that hides and shows its series.
+  entry(entry) {
+    const button = this.toggle(entry.label, !this.hidden.has(entry.label), (on) => { if (on) this.hidden.delete(entry.label); else this.hidden.add(entry.label); this.redraw(); });
+    const key = document.createElement("canvas"), px = devicePixelRatio;
+    [key.width, key.height] = [24 * px, 12 * px];
+    drawKey(key.getContext("2d"), entry, 0, 6 * px, px);
+    button.prepend(key);
+    return button;
   }
 
   // The listeners are on the box, because a panel that is rebuilt for another colour scheme has a new canvas.
@@ -443,7 +469,11 @@ class Chart {
   }
 
   show(name, range) {
-    for (const panel of this.panels) if (panel.panel.x_label === name) { panel.more.range = range; panel.plot.setScale("x", { min: range[0], max: range[1] }); }
+    for (const panel of this.panels) {
+      if (panel.panel.x_label !== name) continue;
+      panel.more.range = range;
+      if (panel.panel.zero) panel.show(panel.panel); else panel.plot.setScale("x", { min: range[0], max: range[1] });
+    }
   }
 
   async save() {
@@ -468,31 +498,39 @@ async function paper(chart, width, times, seen = null) {
   await null;  // uPlot draws in a microtask
   for (const panel of panels) if (panel.panel.equal) panel.show(panel.panel); else panel.plot.redraw(false, true);
   await null;
-  const entries = entriesOf(chart, false).filter((entry) => !hidden.has(entry.label)), font = `${12 * times}px ${FONT}`, rows = [[]];
+  const font = `${12 * times}px ${FONT}`, line = 18 * times;
   ctx.font = font;
-  for (const entry of entries) {
-    entry.wide = ctx.measureText(entry.label).width + 46 * times;
-    if (rows.at(-1).reduce((sum, each) => sum + each.wide, entry.wide) > width * times && rows.at(-1).length) rows.push([]);
-    rows.at(-1).push(entry);
-  }
-  const top = entries.length ? 18 * times * rows.length : 0;
+  const legends = legendsOf(chart, false).map((entries) => {
+    const rows = [[]];
+    for (const entry of entries.filter(({ label }) => !hidden.has(label))) {
+      entry.wide = ctx.measureText(entry.label).width + 46 * times;
+      if (rows.at(-1).reduce((sum, each) => sum + each.wide, entry.wide) > width * times && rows.at(-1).length) rows.push([]);
+      rows.at(-1).push(entry);
+    }
+    return rows.filter((row) => row.length);
+  });
   canvas.width = width * times;
-  canvas.height = top + panels.reduce((sum, { plot }) => sum + plot.ctx.canvas.height, 0);
+  canvas.height = panels.reduce((sum, { plot }, i) => sum + line * legends[i].length + plot.ctx.canvas.height, 0);
   ctx.fillStyle = "#ffffff";
   ctx.fillRect(0, 0, canvas.width, canvas.height);
   ctx.font = font;
   ctx.textBaseline = "middle";
-  rows.forEach((row, i) => {
-    let x = 8 * times;
-    for (const entry of row) {
-      drawKey(ctx, entry, x, (18 * i + 9) * times, times);
-      ctx.fillStyle = "#1d232a";
-      ctx.fillText(entry.label, x + 30 * times, (18 * i + 9) * times);
-      x += entry.wide;
+  let y = 0;
+  for (const [i, { plot }] of panels.entries()) {
+    for (const row of legends[i]) {
+      let x = 8 * times;
+      for (const entry of row) {
+        drawKey(ctx, entry, x, y + line / 2, times);
+        ctx.fillStyle = "#1d232a";
+        ctx.fillText(entry.label, x + 30 * times, y + line / 2);
+        x += entry.wide;
+      }
+      y += line;
     }
-  });
-  let y = top;
-  for (const { plot } of panels) { ctx.drawImage(plot.ctx.canvas, 0, y); y += plot.ctx.canvas.height; plot.destroy(); }
+    ctx.drawImage(plot.ctx.canvas, 0, y);
+    y += plot.ctx.canvas.height;
+    plot.destroy();
+  }
   holder.remove();
   return canvas;
 }

@@ -113,7 +113,7 @@ function show_chart(shown, chart) {
 
 // The names of a panel's series under it.
 function name_series(chart) {
-  const names = entriesOf({ panels: [chart.panel] }, isDark(chart.box)).map((entry) => {
+  const names = legendsOf({ panels: [chart.panel] }, isDark(chart.box))[0].map((entry) => {
     const found = item(entry.label), key = document.createElement("canvas");
     [key.width, key.height] = [24, 12];
     drawKey(key.getContext("2d"), entry, 0, 6, 1);

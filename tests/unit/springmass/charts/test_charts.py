@@ -13,7 +13,7 @@ from pipeline.analyse import Analysis, Oscillation
 from pipeline.results.classic import classic
 from pipeline.several.compare import SpringRun, compare_springs
 from pipeline.track import F8
-from springmass.charts.chart import Chart, ChartNote, Panel, Series, decoded, to_json
+from springmass.charts.chart import Chart, ChartNote, Panel, Series, decoded, line_of, to_json
 from springmass.charts.draw import render
 from springmass.charts.run import charts_of
 from springmass.charts.several import comparison, course, drag_map, overlay
@@ -121,16 +121,27 @@ def test_drag_and_energy(charts: dict[str, Drawn], damped: Analysis) -> None:
 
 
 def test_motion_and_phase(charts: dict[str, Drawn], damped: Analysis) -> None:
-    """Velocity and acceleration follow from amplitude and angular frequency; the phase plot is an ellipse of ω."""
+    """Velocity and acceleration follow from amplitude and angular frequency; turns of the phase plot are ellipses."""
     omega, size = damped.estimates["angular_frequency"].value, damped.estimates["amplitude"].value
     _, velocity = charts["motion"].xy("velocity")
     assert np.sqrt(np.mean(velocity**2)) == pytest.approx(damped.estimates["velocity_rms"].value, rel=0.01)
     _, acceleration = charts["motion"].xy("acceleration", 1)
     assert np.max(acceleration) == pytest.approx(omega**2 * size, rel=0.02)
-    x, v = charts["phase"].xy("fitted motion")
-    assert np.nanmax(np.abs(v)) / np.nanmax(np.abs(x)) == pytest.approx(1e-3 * omega, rel=0.02)
-    turns = np.ptp(np.unwrap(np.arctan2(1e3 * v, omega * x))) / (2 * np.pi)
-    assert turns == pytest.approx(np.ptp(damped.track.t) / damped.estimates["period"].value, abs=1.0)
+    labels = [series["label"] for series in charts["phase"].json["panels"][0]["series"]]
+    turns = [charts["phase"].xy(label) for label in labels]
+    for x, v in turns:
+        assert np.max(np.abs(v)) / np.max(np.abs(x)) == pytest.approx(1e-3 * omega, rel=0.02)
+        assert np.ptp(np.unwrap(np.arctan2(1e3 * v, omega * x))) == pytest.approx(2 * np.pi, rel=0.02)
+    assert len(set(labels)) == len(labels) > 2
+    assert np.max(turns[0][0]) > np.max(turns[-1][0])
+
+
+def test_a_line_of_many_periods_is_solid() -> None:
+    """A line that goes up and down all the time is marked for the browser, in which its dashes would be moiré."""
+    t = np.linspace(0.0, 20.0, 2000)
+    lines = (line_of("slow", t, np.exp(-t), "other"), line_of("quick", t, np.cos(2 * np.pi * t), "other"))
+    (panel,) = to_json(Chart("x", "X", "", (Panel("y / mm", lines),)))["panels"]
+    assert [line.get("winds", False) for line in panel["series"]] == [False, True]
 
 
 def test_several_runs(damped: Analysis, motion: Oscillation) -> None:

@@ -9,15 +9,24 @@ import numpy as np
 import pytest
 
 import springmass
+from acquisition.block import Block, SourceInfo
 from acquisition.clock import VirtualClock
 from acquisition.decoders.registry import get_family
 from acquisition.events import RunEnded, TimedOut, Triggered, Zeroed
-from pipeline.bench.scene import Scene
 from pipeline.track import Track
+from springmass.loading.options import AnalysisOptions
 from springmass.page.feeds import LogFeed, view_of
-from springmass.page.live_analysis import motion_of
+from springmass.page.live_analysis import motion_message
+from springmass.runs.rolling import analysed, live_run
 from storage.recorder import Recorder
 from storage.wire_log.records import LogHeader, SensorEntry
+
+FAST = AnalysisOptions(accuracy="fast")
+
+
+def track_of(feed: LogFeed) -> Track:
+    """Return the samples so far as the page analyses them."""
+    return feed.view.live_run(feed.view.series[0].block(), FAST).loaded.track
 
 
 def test_a_log_is_seen_as_it_grows(tmp_path: Path) -> None:
@@ -50,7 +59,8 @@ def test_the_fit_decays_as_its_law() -> None:
     t = np.arange(3000) / 100
     gamma, omega = 0.02, 8.0
     y = 0.25 + 0.05 * np.exp(-gamma * t) * np.cos(omega * t) + 1e-5 * np.random.default_rng(4).standard_normal(t.size)
-    fit = motion_of(Track(t, y, np.zeros(t.size, np.uint8), 100.0, clock="device"), Scene.from_mapping({}))["fit"]
+    samples, info = Block(0, t, y, np.zeros(t.size, np.uint8)), SourceInfo("live", "", 100.0, clock="device")
+    fit = motion_message(analysed(live_run(samples, info, None, {}, FAST)))["fit"]
     later = np.arange(20.0, 60.0, 0.1)
     decay = fit["decay"]
     times = decay["from"] + decay["step"] * np.arange(len(decay["value"]))
@@ -85,7 +95,7 @@ def test_marks_and_triggers_wait_for_the_first_sample(tmp_path: Path) -> None:
         recorder.mark("lamp on", host_ns=4_000_000_000)
         recorder.drain()
         feed.poll()
-        assert (feed.view.marks, feed.view.track().trigger_s) == ([], None)
+        assert (feed.view.marks, track_of(feed).trigger_s) == ([], None)
         for part in (range(100), range(100, 600)):
             put_samples(recorder, part)
             recorder.drain()
@@ -94,7 +104,7 @@ def test_marks_and_triggers_wait_for_the_first_sample(tmp_path: Path) -> None:
         assert feed.view.zero == {"rest_m": 0.3, "noise_m": 2e-4}
     loaded = springmass.load(path).loaded
     assert feed.view.marks == [(mark["t_s"], mark["text"]) for mark in loaded.provenance["marks"]]
-    assert feed.view.track().trigger_s == loaded.track.trigger_s == pytest.approx(3.0, abs=0.01)
+    assert track_of(feed).trigger_s == loaded.track.trigger_s == pytest.approx(3.0, abs=0.01)
     assert view_of(loaded).zero == feed.view.zero
     feed.close()
 
@@ -110,7 +120,7 @@ def test_a_log_that_has_ended_is_analysed_on_the_page_as_anywhere_else(tmp_path:
     feed = LogFeed(path)
     feed.poll()
     assert feed.view.ended
-    shown, loaded = feed.view.track(), springmass.load(path).loaded.track
+    shown, loaded = track_of(feed), springmass.load(path).loaded.track
     for each in dataclasses.fields(Track):
         np.testing.assert_array_equal(getattr(shown, each.name), getattr(loaded, each.name), err_msg=each.name)
     assert shown.trigger_s is not None

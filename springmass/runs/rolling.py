@@ -1,0 +1,109 @@
+"""The analysis of a recording that still grows, repeated as often as its share of a core allows."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from acquisition.block import Block, SourceInfo
+from acquisition.buffer import SampleBuffer
+from acquisition.recordings.recording import Recording
+from pipeline.errors import PipelineError
+from springmass.loading.loaded import Loaded
+from springmass.loading.options import AnalysisOptions
+from springmass.runs.run import Run
+
+FEWEST = 16
+"""Number of samples before the first analysis, a sixth of a second at 100 Hz."""
+
+
+@dataclass(frozen=True, slots=True)
+class NotYet:
+    """The reason why there is no analysis yet."""
+
+    why: str  # in one line
+
+
+def live_run(
+    samples: Block,
+    info: SourceInfo,
+    scene: Mapping[str, Any] | None,
+    provenance: Mapping[str, Any],
+    how: AnalysisOptions,
+) -> Run:
+    """Return the samples so far of a recording that is being made, as the run that its log would give."""
+    return Run(Loaded(Recording("wire", "", info, "", samples), "wire", scene, provenance), how=how)
+
+
+def part_of(run: Run, low_s: float, high_s: float) -> Run:
+    """Return the part of a run between two times, which may be empty, not analysed yet."""
+    return replace(run, loaded=replace(run.loaded, from_s=low_s, to_s=high_s))
+
+
+def analysed(run: Run) -> Run | NotYet:
+    """Return a run that has its analysis, or why its samples cannot be analysed."""
+    try:
+        _ = run.analysis
+    except PipelineError as error:
+        return NotYet(str(error))
+    return run
+
+
+class Rolling:
+    """Analyses the samples so far whenever this takes less than a share of the time since the last analysis.
+
+    Parameters
+    ----------
+    run_of : callable
+        Returns the run of samples; the analysis of a run is that of the same samples at any later time.
+    samples : SampleBuffer
+        Holds the samples; another thread may push into it.
+    share : float
+        Largest share of a core for the analyses.
+    now : callable
+        Returns the time in s from which the share is computed.
+    """
+
+    def __init__(
+        self,
+        run_of: Callable[[Block], Run],
+        samples: SampleBuffer,
+        *,
+        share: float,
+        now: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._run_of, self._samples, self._share, self._now = run_of, samples, share, now
+        self._analysed = FEWEST - 1
+        self._due_s = -math.inf
+        self._cost_s = 0.0
+        self._latest: Run | NotYet | None = None
+
+    def push(self, block: Block) -> None:
+        """Take the next samples."""
+        self._samples.push(block)
+
+    def due(self) -> bool:
+        """Return whether samples came since the last analysis, and the share allows another one."""
+        return self._samples.pushed > self._analysed and self._now() >= self._due_s
+
+    def latest(self, seconds: float = math.inf) -> Run | NotYet:
+        """Return the analysed run of the last seconds, or why there is none; it is analysed anew if that is due."""
+        if self.due():
+            self._analysed, start_s = self._samples.pushed, time.thread_time()
+            run = self.run()
+            if math.isfinite(seconds):
+                run = part_of(run, float(run.loaded.samples.t[-1]) - seconds, math.inf)
+            self._latest = analysed(run)
+            # Time in this thread, without waiting for a core that other programs use. An analysis that first loads a
+            # library takes longer; the next one need not wait for that.
+            cost_s = time.thread_time() - start_s
+            self._due_s = self._now() + min(cost_s, self._cost_s) / self._share
+            self._cost_s = cost_s
+        return NotYet(f"{self._samples.pushed} samples so far") if self._latest is None else self._latest
+
+    def run(self) -> Run:
+        """Return the samples as they are now as a run that is not analysed yet."""
+        return self._run_of(self._samples.block())
