@@ -20,9 +20,11 @@ class ValueKind(Enum):
     NAME = "name"
     POSITIVE = "positive number"
     FILE = "file"
+    YES = "yes"
 
 
-def _words(metavar: str, words: str, kind: ValueKind = ValueKind.NAME) -> Mapping[str, Any]:
+def words_of(metavar: str, words: str, kind: ValueKind = ValueKind.NAME) -> Mapping[str, Any]:
+    """Return what a person reads of an option, as the metadata of its field."""
     return {"metavar": metavar, "help": words, "kind": kind}
 
 
@@ -31,28 +33,28 @@ class ReadOptions:
     """The statements of a user about a file; None for each that is not made, then only the file's own are used."""
 
     velocity: str | Path | None = field(
-        default=None, metadata=_words("FILE", "velocity file that belongs to the position file", ValueKind.FILE)
+        default=None, metadata=words_of("FILE", "velocity file that belongs to the position file", ValueKind.FILE)
     )
     channel: str | None = field(
-        default=None, metadata=_words("NAME", "channel to use if there are several; for a wire log, the sensor")
+        default=None, metadata=words_of("NAME", "channel to use if there are several; for a wire log, the sensor")
     )
-    run: str | None = field(default=None, metadata=_words("NAME", "run to use if there are several: name or number"))
+    run: str | None = field(default=None, metadata=words_of("NAME", "run to use if there are several: name or number"))
     rate_hz: float | None = field(
-        default=None, metadata=_words("R", "samples per second if the file does not state them", ValueKind.POSITIVE)
+        default=None, metadata=words_of("R", "samples per second if the file does not state them", ValueKind.POSITIVE)
     )
     unit: str | None = field(
-        default=None, metadata=_words("U", "unit of the channel if the file does not state it: m, cm, rad, V ...")
+        default=None, metadata=words_of("U", "unit of the channel if the file does not state it: m, cm, rad, V ...")
     )
     time: str | None = field(
-        default=None, metadata=_words("NAME", "column with the times if the file does not state it")
+        default=None, metadata=words_of("NAME", "column with the times if the file does not state it")
     )
     time_unit: str | None = field(
-        default=None, metadata=_words("U", "unit of the times if the file does not state it: s, ms, us, min, h, d")
+        default=None, metadata=words_of("U", "unit of the times if the file does not state it: s, ms, us, min, h, d")
     )
     delimiter: str | None = field(
-        default=None, metadata=_words("C", "separator of a text's cells, else found out: comma, tab, space, ';' ...")
+        default=None, metadata=words_of("C", "separator of a text's cells, else found out: comma, tab, space, ';' ...")
     )
-    decimal: str | None = field(default=None, metadata=_words("C", "decimal mark of a text, else found out: . or ,"))
+    decimal: str | None = field(default=None, metadata=words_of("C", "decimal mark of a text, else found out: . or ,"))
 
     def given(self) -> dict[str, Any]:
         """Return the values of all options that are not the default, by name."""
@@ -77,11 +79,16 @@ READ_DEFAULTS = ReadOptions()
 """Nothing is stated."""
 
 
-def value_of(name: str, value: object) -> str | float:
+def value_of(name: str, value: object, options: Mapping[str, Field[Any]] = READ_FIELDS) -> str | float | bool:
     """Return the value of an option that a person wrote; ValueError says what it must be."""
-    if name not in READ_FIELDS:
-        raise ValueError(f"{name!r} is no option of reading; the options are {', '.join(READ_FIELDS)}")
-    if READ_FIELDS[name].metadata["kind"] is not ValueKind.POSITIVE:
+    if name not in options:
+        raise ValueError(f"{name!r} is no option of reading; the options are {', '.join(options)}")
+    kind = options[name].metadata["kind"]
+    if kind is ValueKind.YES:
+        if value != "yes":
+            raise ValueError(f"{name} must be yes or left out, got {value!r}")
+        return True
+    if kind is not ValueKind.POSITIVE:
         if not isinstance(value, str) or not value:
             raise ValueError(f"{name} must be a text, got {value!r}")
         return value

@@ -28,7 +28,7 @@ from springmass.commands.options import (
     Scenes,
     Strict,
 )
-from springmass.commands.parameters import argument, flag, option, output
+from springmass.commands.parameters import Finite, argument, flag, option, output
 from springmass.commands.questions import for_command, option_words
 from springmass.errors import HINT, LOG, OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError
 from springmass.layout import STDIN
@@ -52,6 +52,8 @@ class AnalyseOptions:
     """The options of ``springmass analyse``."""
 
     scene: Scenes = ()
+    from_s: Annotated[Finite | None, option("S", "use samples from this time on, s", "--from")] = None
+    to_s: Annotated[Finite | None, option("S", "use samples up to this time, s", "--to")] = None
     method: Annotated[
         Literal["classic"] | None,
         option("NAME", "also apply the lab report's classic method, for comparison"),
@@ -82,7 +84,8 @@ def analyse(
     given: GivenOptions,
 ) -> int:
     """Analyse every input; if one fails, the others still give results."""
-    inputs, how = [str(each) for each in recordings], analysis.of(read, options.method)
+    inputs = [str(each) for each in recordings]
+    how = analysis.of(read, method=options.method, from_s=options.from_s, to_s=options.to_s)
     if options.keep and (not read.about_the_file().given() or STDIN in inputs):
         raise ProgramError("--keep keeps options of reading such as --unit next to a file", "give one, and the file")
     if how.velocity is not None and (len(inputs) > 1 or Path(inputs[0]).is_dir()):

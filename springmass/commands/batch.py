@@ -10,7 +10,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from springmass.commands.given import GivenOptions
-from springmass.commands.options import AnalysisArguments, FileArgument, ReadPairs, refuse
+from springmass.commands.options import AnalysisArguments, FileArgument, ReadPairs
 from springmass.commands.parameters import PositiveCount, WholeNumber, argument, flag, option, output
 from springmass.commands.questions import for_course
 from springmass.course.page import COURSE_PAGE, GROUPS_FILE
@@ -52,7 +52,7 @@ def batch(
     given: GivenOptions,
 ) -> int:
     """Analyse new and changed runs, and write the table and the page of all runs."""
-    refuse("batch", reading.options, "velocity")
+    reading.refuse("on a course, whose pairs are found by their names", "velocity")
     how = analysis.of(reading.options)
     inputs = [str(each) for each in recordings]
     if not inputs and options.runs is None:

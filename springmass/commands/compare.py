@@ -23,7 +23,6 @@ from springmass.commands.options import (
     ReadPairs,
     Scenes,
     Strict,
-    refuse,
 )
 from springmass.commands.parameters import Share, argument, option, output
 from springmass.comparing.comparison import SpringComparison, compare_runs, comparison_json, line_and_hooke_words
@@ -72,7 +71,7 @@ def compare(
     given: GivenOptions,
 ) -> int:
     """Analyse every run, compare them, and print or write the result; for courses use the existing results."""
-    refuse("compare", reading.options, "velocity")
+    reading.refuse("on several runs", "velocity")
     how = analysis.of(reading.options)
     inputs = [str(each) for each in recordings]
     if all(is_course(path) for path in inputs):

@@ -10,8 +10,9 @@ from typing import Annotated
 from acquisition.recordings.writers import WRITERS
 from springmass.commands.given import GivenOptions
 from springmass.commands.options import FileArgument, Overwrite, ReadArguments
-from springmass.commands.parameters import argument, option, output
+from springmass.commands.parameters import argument, option
 from springmass.errors import HINT, LOG, OK, UNREADABLE, ProgramError
+from springmass.loading.inputs import RUN_SUFFIXES
 from springmass.loading.load import load
 from springmass.loading.loaded import Loaded
 from springmass.loading.save import save_run
@@ -19,32 +20,25 @@ from springmass.loading.scenes import read_scene
 from springmass.result.output_names import numbered
 from storage.atomic import write_whole
 
-RUN_SUFFIXES = (".h5", ".hdf5", ".nxs")
-
 
 def convert(
     recording: Annotated[FileArgument, argument("IN", "recording, run file or wire log")],
-    target: Annotated[
-        FileArgument | None, argument("OUT", ".h5 (run file), .txt (pair) or .csv; or a folder to copy the original to")
-    ] = None,
+    output: Annotated[
+        FileArgument, argument("OUT", ".h5 (run file), .txt (pair) or .csv; or a folder to copy the original to")
+    ],
     /,
     *,
-    output: Annotated[FileArgument | None, output("OUT", "the output, instead of a second argument")] = None,
     scene: Annotated[FileArgument | None, option("FILE", "scene file to store in the run file")] = None,
     overwrite: Overwrite = False,
     read: ReadArguments = ReadArguments(),
     given: GivenOptions,
 ) -> int:
     """Convert one input."""
-    if output is not None and target is not None:
-        raise ProgramError(f"convert writes one output, got {target} and -o {output}", "name it once")
-    if (output := target or output) is None:
-        raise ProgramError(f"OUT is missing: convert {recording} to what? its suffix says the form")
-    if Path(output).suffix.lower() not in RUN_SUFFIXES:
+    out = Path(output)
+    if out.suffix.lower() not in RUN_SUFFIXES:
         given.refuse("on an output that is no run file", "--scene")
     given_scene = None if scene is None else read_scene(scene).to_mapping()
     loaded = load(recording, read)
-    out = Path(output)
     if out.suffix.lower() in RUN_SUFFIXES:
         written = save_run(out, loaded, scene=given_scene, overwrite=overwrite)
         LOG.info(f"{written}: {len(loaded.samples)} samples from {loaded.path}")

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import Field, dataclass, field, make_dataclass
+from dataclasses import Field, dataclass, field, fields, make_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Group, Parameter, Token
 
-from acquisition.recordings.reading import READ_FIELDS, ReadOptions, ValueKind, value_of
-from springmass.commands.parameters import Finite, LawName, PartsPerMillion, Positive, TcpPort, argument, flag, option
+from acquisition.recordings.reading import ReadOptions, ValueKind, value_of
+from springmass.commands.parameters import LawName, PartsPerMillion, Positive, TcpPort, argument, flag, option
 from springmass.errors import ProgramError
-from springmass.loading.options import Accuracy, AnalysisOptions, LoadOptions
+from springmass.loading.options import LOAD_FIELDS, Accuracy, AnalysisOptions, LoadOptions
 
 FileArgument = str | Path
 """The name of a file; a shell completes it."""
@@ -132,21 +132,25 @@ class PageOptions:
     law: LawName = None
 
 
-_TYPES = {ValueKind.NAME: str | None, ValueKind.POSITIVE: Positive | None, ValueKind.FILE: str | Path | None}
-_UNVERIFIED = Annotated[bool, flag("read a run file despite a checksum mismatch")]
+_TYPES = {
+    ValueKind.NAME: str | None,
+    ValueKind.POSITIVE: Positive | None,
+    ValueKind.FILE: str | Path | None,
+    ValueKind.YES: bool,
+}
 
 
 def _declared(of: Field[Any]) -> tuple[str, Any, Any]:
     """Return an option of reading as the command line declares it."""
     kind, words = _TYPES[of.metadata["kind"]], option(of.metadata["metavar"], of.metadata["help"])
-    return of.name, Annotated[kind, words], field(default=None)
+    return of.name, Annotated[kind, words], field(default=of.default)
 
 
-def _arguments(name: str, base: type, *more: tuple[str, Any, Any]) -> type:
-    """Return a class of the options of reading as the command line has them, each with its words, and more."""
+def _arguments(name: str, base: type[ReadOptions]) -> type:
+    """Return a class of the options of reading as the command line has them, each with its words."""
     # Cyclopts looks into a class only if it names the module that it comes from.
     words = {"__doc__": "The options of reading, each with its words.", "__module__": __name__}
-    declared = [*map(_declared, READ_FIELDS.values()), *more]
+    declared = [_declared(each) for each in fields(base)]
     made = make_dataclass(name, declared, bases=(base,), namespace=words, frozen=True, kw_only=True)
     return Parameter(name="*", group=HOW_READ)(made)
 
@@ -156,7 +160,7 @@ if TYPE_CHECKING:
     ReadArguments = LoadOptions
 else:
     FileArguments = _arguments("FileArguments", ReadOptions)
-    ReadArguments = _arguments("ReadArguments", LoadOptions, ("unverified", _UNVERIFIED, field(default=False)))
+    ReadArguments = _arguments("ReadArguments", LoadOptions)
 
 
 def _answer(text: str) -> tuple[str, Any]:
@@ -164,7 +168,7 @@ def _answer(text: str) -> tuple[str, Any]:
     if not equals:
         raise ValueError("must be KEY=VALUE, for example unit=cm")
     name = name.strip().replace("-", "_")
-    return name, value_of(name, value)
+    return name, value_of(name, value, LOAD_FIELDS)
 
 
 @Parameter(name="*", group=Group("Options", sort_key=1))
@@ -176,12 +180,19 @@ class ReadPairs:
         tuple[tuple[str, Any], ...],
         converted("KEY=VALUE", "how to read the file: unit=cm, rate_hz=100 ...; may be repeated", _answer),
     ] = ()
-    unverified: _UNVERIFIED = False
 
     @property
     def options(self) -> LoadOptions:
         """The options of reading."""
-        return LoadOptions(**dict(self.read), unverified=self.unverified)
+        names = [name for name, _ in self.read]
+        if repeated := [name for name in names if names.count(name) > 1]:
+            raise ProgramError(f"--read {repeated[0]}: expected one value, got {names.count(repeated[0])}", "give one")
+        return LoadOptions(**dict(self.read))
+
+    def refuse(self, use: str, *names: str) -> None:
+        """Refuse options of reading for which a use of the command has no use."""
+        if unused := [name for name, _ in self.read if name in names]:
+            raise ProgramError(f"--read {', '.join(unused)}: no effect {use}", "leave it out")
 
 
 @Parameter(name="*", group=Group("Options", sort_key=1))
@@ -189,20 +200,12 @@ class ReadPairs:
 class AnalysisArguments:
     """The options of an analysis as the command line has them, each with its words."""
 
-    from_s: Annotated[Finite | None, option("S", "use samples from this time on, s", "--from")] = None
-    to_s: Annotated[Finite | None, option("S", "use samples up to this time, s", "--to")] = None
     clock_ppm: Annotated[
         PartsPerMillion | None, option("PPM", "largest rate error of the sensor's clock (default: that of its family)")
     ] = None
     accuracy: Annotated[Accuracy, option("TIER", "how much time to spend on accuracy (default: standard)")] = "standard"
     law: LawName = None
 
-    def of(self, read: LoadOptions, method: Literal["classic"] | None = None) -> AnalysisOptions:
-        """Return the options of the analysis of a recording that is read in a given way."""
-        return AnalysisOptions(**vars(self), **read.given(), method=method)
-
-
-def refuse(command: str, read: LoadOptions, *names: str) -> None:
-    """Refuse options of reading that mean nothing to a command."""
-    if given := [name for name in read.given() if name in names]:
-        raise ProgramError(f"{', '.join(given)}: {command} has no use for it", "leave it out")
+    def of(self, read: LoadOptions, **more: Any) -> AnalysisOptions:
+        """Return the options of the analysis of a recording that is read in a given way, with those of the command."""
+        return AnalysisOptions(**vars(self), **read.given(), **more)

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 import sys
 import threading
 import webbrowser
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 from springmass.commands.given import GivenOptions
 from springmass.commands.options import PageOptions, ReadPairs, RecordingArgument
-from springmass.commands.parameters import flag
 from springmass.commands.questions import option_words
 from springmass.errors import LOG, OK, ProgramError
 from springmass.loading.inputs import kind_of
 from springmass.loading.load import load
 from springmass.page.feeds import view_of
+from springmass.page.recorder_side import OF_RECORDER
 from springmass.page.state import PageState
 from springmass.page.web.server import address_in_network, code_for_terminal, serve
 from springmass.stops import STOPS
@@ -30,11 +31,10 @@ def page(
     *,
     page: PageOptions = PageOptions(),
     reading: ReadPairs = ReadPairs(),
-    recorder: Annotated[bool, flag("used internally by `record --page`")] = False,
     given: GivenOptions,
 ) -> int:
     """Serve the page until Ctrl-C; for a recording, until the recorder has ended and no browser shows the page."""
-    path = Path(recording)
+    path, recorder = Path(recording), os.environ.pop(OF_RECORDER, None) is not None
     over = threading.Event()
     network = address_in_network() if page.lan else ""
     wanted_u_s = None if page.want_us is None else page.want_us * 1e-6
@@ -48,7 +48,7 @@ def page(
     if recorder:
         threading.Thread(target=_listen, args=(state, over), name="springmass-page-recorder", daemon=True).start()
     elif kind_of(path) == "wire":
-        given.refuse("on a wire log, which is shown as it grows", "--read", "--unverified")
+        given.refuse("on a wire log, which is shown as it grows", "--read")
         state.follow(path)
     else:
         loaded = load(path, reading.options)

@@ -26,6 +26,7 @@ from pipeline.bench.air import speed_of_sound
 from pipeline.bench.disc import scene_air
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import format_value
+from springmass.commands.given import GivenOptions
 from springmass.commands.options import FileArgument, PageOptions, converted
 from springmass.commands.parameters import (
     PartsPerMillion,
@@ -37,7 +38,7 @@ from springmass.commands.parameters import (
     option,
     output,
 )
-from springmass.commands.questions import option_words
+from springmass.commands.questions import option_of, option_words
 from springmass.errors import INTERNAL, INTERRUPTED, OK, SENSOR, UNREADABLE, ProgramError
 from springmass.loading.save import made_now
 from springmass.loading.scenes import ask_about, read_scene
@@ -112,7 +113,9 @@ class RecordOptions:
     seed: Annotated[Whole, option("N", "with --simulate: seed of the noise (default: 0)")] = 0
 
 
-def record(*, options: RecordOptions = RecordOptions(), page_options: PageOptions = PageOptions()) -> int:
+def record(
+    *, options: RecordOptions = RecordOptions(), page_options: PageOptions = PageOptions(), given: GivenOptions
+) -> int:
     """Record, then build the run file from the log."""
     what = "simulated" if options.simulate else "run"
     if options.scene is not None:
@@ -120,7 +123,15 @@ def record(*, options: RecordOptions = RecordOptions(), page_options: PageOption
     out = default_name(options.title or what, datetime.now()) if options.output is None else Path(options.output)
     if out.suffix.lower() != ".h5":
         raise ProgramError(f"{out}: a recording becomes a run file, whose name ends in .h5")
-    _demand_sense(options, page_options)
+    for use, off, names in (
+        ("with --simulate", options.simulate, ("--port",)),
+        ("without --simulate", not options.simulate, ("--seed",)),
+        ("without --still", options.still is None, ("--ruler",)),
+        ("without --trigger", options.trigger is None, ("--pre",)),
+        ("without --page", not options.page, ("--ready", *map(option_of, vars(page_options)))),
+    ):
+        if off:
+            given.refuse(use, *names)
     _fill_standard_streams()
     if not options.simulate:
         ports, names, baud = name_sensors(options.port, options.sensor, options.baud)
@@ -149,8 +160,8 @@ def record(*, options: RecordOptions = RecordOptions(), page_options: PageOption
         page = None
         try:
             if options.page:
-                given = option_words(vars(page_options))
-                process = PageProcess(given, log, queue.SimpleQueue(), STOPS, session.failures, console.line)
+                words = option_words(vars(page_options))
+                process = PageProcess(words, log, queue.SimpleQueue(), STOPS, session.failures, console.line)
                 page = beside.enter_context(process)
             ended = _Bench(session, options, log, console, release, page).record()
             session.stop()
@@ -247,21 +258,6 @@ def _fill_standard_streams() -> None:
             os.fstat(number)
         except OSError:
             os.open(os.devnull, os.O_RDWR)
-
-
-def _demand_sense(options: RecordOptions, page: PageOptions) -> None:
-    """Refuse options that would do nothing without another, or with it."""
-    for name, given, needed, there in (
-        ("--ruler", bool(options.ruler), "--still", options.still is not None),
-        ("--pre", options.pre is not None, "--trigger", options.trigger is not None),
-        ("--ready", options.ready, "--page", options.page),
-        ("--lan", page.lan, "--page", options.page),
-        ("--law", page.law is not None, "--page", options.page),
-    ):
-        if given and not there:
-            raise ProgramError(f"{name} does nothing without {needed}", "name both or neither")
-    if options.simulate and options.port:
-        raise ProgramError("--simulate takes no --port", "leave one of them out")
 
 
 @dataclass(frozen=True, slots=True)

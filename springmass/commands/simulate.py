@@ -19,6 +19,7 @@ from springmass.commands.given import GivenOptions
 from springmass.commands.options import FiguresOption, FileArgument, Json, Overwrite, ReadPairs
 from springmass.commands.parameters import Finite, Positive, Whole, flag, option, output
 from springmass.errors import HINT, LOG, OK, ProgramError
+from springmass.loading.inputs import RUN_SUFFIXES
 from springmass.loading.options import AnalysisOptions
 from springmass.loading.scenes import ask_about, read_scene
 from springmass.result.run_json import picked
@@ -57,15 +58,15 @@ def simulate(
     check: Annotated[bool, flag("also measure the error; this takes longer than the simulation")] = False,
     force: Annotated[bool, flag("simulate even if the step is unstable")] = False,
     against: Annotated[FileArgument | None, option("RUN", "measured run to compare with the prediction")] = None,
-    output: Annotated[FileArgument | None, output("RUN.h5", "write the readings of a sensor to a run file")] = None,
+    output: Annotated[
+        FileArgument | None,
+        output("OUT", "RUN.h5 for the readings of a sensor, or the folder of NAME.simulated (default: here)"),
+    ] = None,
     overwrite: Overwrite = False,
     sensor: Annotated[Literal["ideal", "rangefinder"], option("NAME", "sensor of RUN.h5 (default: rangefinder)")] = (
         "rangefinder"
     ),
     seed: Annotated[Whole, option("N", "seed of the sensor's noise (default: 0)")] = 0,
-    folder: Annotated[
-        FileArgument | None, option("DIR", "folder for NAME.simulated (default: here; with --json or -o: none)")
-    ] = None,
     figures: FiguresOption = (),
     as_json: Json = False,
     reading: ReadPairs = ReadPairs(),
@@ -75,14 +76,16 @@ def simulate(
     if scene is None and against is None:
         raise ProgramError("simulate needs --scene S.toml, or --against RUN with a scene of its own")
     if against is None:
-        given.refuse("without --against", "--read", "--unverified")
-    if output is None:
-        given.refuse("without -o", "--sensor", "--seed", "--overwrite")
-    if folder is None and (as_json or output is not None):
-        given.refuse("without --folder", "--figures")
+        given.refuse("without --against", "--read")
+    run_file = Path(output) if output is not None and Path(output).suffix.lower() in RUN_SUFFIXES else None
+    folder = None if run_file or (as_json and output is None) else output or "."
+    if run_file is None:
+        given.refuse("without -o RUN.h5", "--sensor", "--seed", "--overwrite")
+    if folder is None:
+        given.refuse("without a folder, which -o DIR names", "--figures")
     where, say = str(against if scene is None else scene), sys.stderr if as_json else sys.stdout
-    if output is not None and Path(output).exists() and not overwrite:
-        raise ProgramError(f"{visible(str(output))}: exists", "take another name, or --overwrite")
+    if run_file is not None and run_file.exists() and not overwrite:
+        raise ProgramError(f"{visible(str(run_file))}: exists", "take another name, or --overwrite")
     stated, analysis, longest_s = None if scene is None else read_scene(scene), None, seconds or 10.0
     if scene is not None and stated is not None:
         ask_about(stated, scene)
@@ -127,23 +130,19 @@ def simulate(
         left = f"rms {over.rms_m * 1e3:.3g} mm, noise of a sample {over.noise_m * 1e3:.3g} mm"
         print("\n".join([f"against the run  {left}", *deviation_text(over)]), file=say)
         results["against"] = over.summary()
-    written: list[Path] = []
-    if output is not None:
+    made = run_file
+    if run_file is not None:
         from springmass.simulations.run_files import write_readings
 
-        write_readings(Path(output), ready, simulation, sensor, seed, where, results)
-        written.append(Path(output))
-    if folder is not None or not (as_json or output is not None):
+        write_readings(run_file, ready, simulation, sensor, seed, where, results)
+    elif folder is not None:
         from springmass.report.simulated import write_folder
 
-        made = write_folder(simulation, over, band, ready.solved, where, folder or ".", results, figures)
-        written.append(made / "run.h5")
+        made = write_folder(simulation, over, band, ready.solved, where, folder, results, figures)
+    if made is not None:
         print(f"written          {visible(str(made))}", file=say)
-    elif output is not None:
-        print(f"written          {visible(str(output))}", file=say)
-    for path in written[:1]:
         of_scene = "" if scene is None else f" --scene {shlex.quote(where)}"
-        LOG.log(HINT, f"springmass analyse {shlex.quote(str(path))}{of_scene}")
+        LOG.log(HINT, f"springmass analyse {shlex.quote(str(run_file or made / 'run.h5'))}{of_scene}")
     if as_json:
         print(json.dumps(results))
     return OK

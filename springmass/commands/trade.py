@@ -9,9 +9,10 @@ from typing import Annotated, Any
 from pipeline.analysis import Oscillation
 from springmass import __version__
 from springmass.commands.given import GivenOptions
-from springmass.commands.options import AnalysisArguments, FileArgument, Json, ReadPairs
+from springmass.commands.options import FileArgument, Json, ReadPairs
 from springmass.commands.parameters import Positive, PositiveCount, argument, option
 from springmass.errors import OK, UNREADABLE, ProgramError
+from springmass.loading.options import AnalysisOptions
 from springmass.loading.scenes import read_scene
 from springmass.runs.run import Run
 from springmass.terminal.progress import counted
@@ -35,7 +36,6 @@ def trade(
     seconds: Annotated[Positive, option("S", "length of the records without a recording, s (default: 60)")] = 60.0,
     as_json: Json = False,
     reading: ReadPairs = ReadPairs(),
-    how: AnalysisArguments = AnalysisArguments(),
     given: GivenOptions,
 ) -> int:
     """Simulate records of one motion, evaluate them with every tier, and solve the motion with every integrator."""
@@ -46,7 +46,7 @@ def trade(
     motion = TrueMotion(seconds=seconds)
     given_scene = None if scene is None else read_scene(scene)
     if recording is not None:
-        analysis = Run.of(recording, given_scene, how.of(reading.options)).analysis
+        analysis = Run.of(recording, given_scene, AnalysisOptions(**reading.options.given())).analysis
         analysis.track.demand_length("a simulation of the motion")
         if not isinstance(analysis.motion, Oscillation):
             raise ProgramError(
@@ -82,7 +82,7 @@ def trade(
     print(_table(heads, [_tier(row) for row in tiers]))
     print()
     if not solved:
-        print(f"no integrator solves the law {motion.law.name}; name another with --law")
+        print(f"no integrator solves the law {motion.law.name}; state another with [damping] law in a scene")
         return OK
     cells = [[r["method"], _setting(r), f"{r['error']:.1e}", str(r["steps"]), _ms(r)] for r in solved]
     print(_table(["integrator", "setting", "error / amplitude", "steps", "time / ms"], cells))

@@ -16,6 +16,8 @@ from springmass.typeset import count
 from storage.run_file.layout import HDF5_MAGIC
 from storage.wire_log.records import WIRE_MAGIC
 
+RUN_SUFFIXES = (".h5", ".hdf5", ".nxs")
+"""Suffixes of run files."""
 FILES_NAMED = 5  # maximum number of files that a message names
 
 

@@ -124,7 +124,7 @@ def _load_run(path: Path, *, unverified: bool = False) -> Loaded:
         except RunDamaged as error:
             if unverified:
                 raise
-            remedy = f"{error.remedy}, or look at it as it is with --unverified"
+            remedy = f"{error.remedy}, or look at it as it is with --unverified (--read unverified=yes)"
             raise RunDamaged(path, error.problem, remedy) from error
         return Loaded(recording, "run", run.header.scene, run.provenance, sha256, originals_inside=True)
 

@@ -20,12 +20,12 @@ from acquisition.recordings.reading import READ_DEFAULTS, ReadOptions, value_of
 from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
 from springmass.errors import ProgramError
-from springmass.loading.inputs import is_recording
+from springmass.loading.inputs import RUN_SUFFIXES, is_recording
 from springmass.loading.scenes import LONGEST_SCENE, read_tables
 from springmass.typeset import count
 from storage.atomic import write_whole
 
-STEM_SUFFIXES = (".h5", ".hdf5", ".nxs", ".wire")
+STEM_SUFFIXES = (*RUN_SUFFIXES, ".wire")
 """Suffixes of run files and logs: the stem names their recording."""
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import Field, dataclass, field, fields, replace
 from types import EllipsisType
 from typing import Any, Literal
 
-from acquisition.recordings.reading import ReadOptions
+from acquisition.recordings.reading import ReadOptions, ValueKind, words_of
 from pipeline.bench.law_names import ANY_LAW
 from pipeline.damping.laws import LAWS, Law, find_law
 from pipeline.errors import AnalysisError
@@ -20,9 +20,13 @@ Accuracy = Literal["fast", "standard", "best"]
 class LoadOptions(ReadOptions):
     """The options of reading, and whether a run file is read despite a checksum mismatch, which no notes can state."""
 
-    unverified: bool = False
+    unverified: bool = field(
+        default=False, metadata=words_of("yes", "read a run file despite a checksum mismatch", ValueKind.YES)
+    )
 
 
+LOAD_FIELDS: Mapping[str, Field[Any]] = {each.name: each for each in fields(LoadOptions)}
+"""The options by name, with what the user reads of them."""
 LOAD_DEFAULTS = LoadOptions()
 """No option given: only the file's own statements, and the notes next to it, are used."""
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import queue
 import shlex
 import subprocess
@@ -22,6 +23,8 @@ from springmass.session.failures import Failures
 from springmass.stops import EndReason, Stops
 
 ENDS_WITHIN_S = 5.0
+OF_RECORDER = "SPRINGMASS_PAGE_OF_RECORDER"
+"""The variable of the environment that tells the process of a page that a recorder speaks to it on stdin."""
 
 
 class PageProcess:
@@ -42,7 +45,7 @@ class PageProcess:
         say: Callable[[str], None],
     ) -> None:
         self._log, self.marks, self._stops, self._failures, self._say = log, marks, stops, failures, say
-        self._command = [sys.executable, "-m", "springmass", "page", "--recorder", *arguments, "--", str(log)]
+        self._command = [sys.executable, "-m", "springmass", "page", *arguments, "--", str(log)]
         self.requests: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
         self._lines: queue.SimpleQueue[dict[str, Any] | None] = queue.SimpleQueue()
         self._phase = "waiting"
@@ -54,7 +57,10 @@ class PageProcess:
         try:
             # In a separate session, because Ctrl-C is meant for the recording, which ends the page later.
             pipe = subprocess.PIPE
-            self._process = subprocess.Popen(self._command, stdin=pipe, stdout=pipe, start_new_session=True)
+            environment = {**os.environ, OF_RECORDER: "1"}
+            self._process = subprocess.Popen(
+                self._command, stdin=pipe, stdout=pipe, start_new_session=True, env=environment
+            )
         except OSError as error:
             self._lost(error)
             return self

@@ -39,7 +39,7 @@ def test_the_prediction_is_told_in_the_quantities_of_table_1(
     """Period, damping rate and Q at the start, and the amplitude at the end as its law says; printed and in JSON."""
     path = tmp_path / "bench.toml"
     path.write_text(f"{LINEAR}[damping]\n{damping}\n")
-    done = cli("simulate", "--scene", path, "--seconds", "20", "--folder", tmp_path)
+    done = cli("simulate", "--scene", path, "--seconds", "20", "-o", tmp_path)
     (found,) = cli("simulate", "--scene", path, "--seconds", "20", "--json").results
     predicted = found["prediction"]
     assert predicted["period_s"] == pytest.approx(0.2 * np.pi, rel=1e-4)
@@ -66,7 +66,7 @@ def test_readings_are_a_recording_whose_analysis_finds_the_scene(cli: Cli, scene
 def test_an_unstable_step_is_refused_with_limit_and_remedy(cli: Cli, scene: Path, tmp_path: Path) -> None:
     """One line, exit code 2, nothing written; --force runs it and measures how wrong it is."""
     arguments = ("simulate", "--scene", scene, "--seconds", "10", "--method", "forward-euler")
-    arguments += ("--folder", tmp_path / "out")
+    arguments += ("-o", tmp_path / "out")
     done = cli(*arguments)
     assert done.code == 2
     limit = float(done.complaint.split("--dt ")[1].split()[0])
@@ -131,7 +131,7 @@ def bench(tmp_path: Path) -> Path:
 
 def test_the_charts_of_a_simulation_stand_on_a_page(cli: Cli, scene: Path, tmp_path: Path) -> None:
     """Its charts are in simulation.html, and files only on request; both Euler methods are beside the exact motion."""
-    assert cli("simulate", "--scene", scene, "--seconds", "20", "--folder", tmp_path, "--figures", "png").code == 0
+    assert cli("simulate", "--scene", scene, "--seconds", "20", "-o", tmp_path, "--figures", "png").code == 0
     folder = tmp_path / "bench.simulated"
     page = (folder / "simulation.html").read_text("utf-8")
     (text,) = re.findall(r'<script type="application/json" id="charts">(.*?)</script>', page, re.DOTALL)
@@ -210,7 +210,7 @@ def test_the_measured_run_stands_in_the_charts_of_both_methods(cli: Cli, scene: 
     """Position, velocity, energy and phase have the recording, which is the exact motion here, as their points."""
     run = tmp_path / "bob.h5"
     assert cli("simulate", "--scene", scene, "--seconds", "20", "--sensor", "ideal", "-o", run).code == 0
-    assert cli("simulate", "--against", run, "--folder", tmp_path).code == 0
+    assert cli("simulate", "--against", run, "-o", tmp_path).code == 0
     assert not (tmp_path / "bob.h5.simulated" / "figures").exists()
     page = (tmp_path / "bob.h5.simulated" / "simulation.html").read_text("utf-8")
     (text,) = re.findall(r'<script type="application/json" id="charts">(.*?)</script>', page, re.DOTALL)

@@ -169,7 +169,7 @@ def page_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
             return out / "clipped_simulated_position.txt.results" / "report.html"
         if name == "simulate":
             words = ["--scene", str(data / "damped.scene.toml"), "--against", str(OLD_RUN), "--seconds", "20"]
-            assert main(["simulate", *words, "--folder", str(out)]) == 0
+            assert main(["simulate", *words, "-o", str(out)]) == 0
             return out / "damped.simulated" / "simulation.html"
         if name == "compare":
             assert main(["compare", undamped, slow, *scenes, "--output", str(out / "compared")]) == 0

@@ -233,6 +233,6 @@ def test_a_killed_page_ends_a_bench_that_waits_for_it(bench: tuple[Any, Page]) -
 
 def kill_page_of(program: Any) -> None:
     """Kill the process of a recording's page."""
-    command = f"springmass page --recorder.* {program.out.with_suffix('.wire')}"
+    command = f"springmass page .*{program.out.with_suffix('.wire')}"
     found = subprocess.run(["pgrep", "-f", command], capture_output=True, text=True)
     os.kill(int(found.stdout), signal.SIGKILL)

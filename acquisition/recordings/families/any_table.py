@@ -19,7 +19,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from acquisition.recordings.recording import FormatIssue
-from acquisition.recordings.tables.cells import clock_s, parse_number
 from acquisition.recordings.tables.format import text_format
 from acquisition.recordings.tables.headings import Heading, headings_of, is_time, split_heading
 from acquisition.recordings.tables.layout import (
@@ -31,8 +30,10 @@ from acquisition.recordings.tables.layout import (
     times_by_steps,
     wrong_commas,
 )
+from acquisition.recordings.tables.numbers import parse_number
 from acquisition.recordings.tables.table import Header
 from acquisition.recordings.tables.text import Text, decode, in_turn
+from acquisition.recordings.tables.times import clock_s
 from acquisition.units import measure_of, time_unit
 
 _MONITOR = re.compile(

@@ -14,9 +14,9 @@ from itertools import pairwise
 
 from acquisition.errors import FormatError
 from acquisition.recordings.families.markup import begins, numbers_of, read_markup, tables_of
-from acquisition.recordings.tables.cells import parse_number
 from acquisition.recordings.tables.format import ColumnFormat
 from acquisition.recordings.tables.headings import ColumnRole, Heading, is_time
+from acquisition.recordings.tables.numbers import parse_number
 from acquisition.recordings.tables.rows import read_rows
 from acquisition.recordings.tables.table import Table, side_by_side
 from acquisition.recordings.tables.text import HEAD_BYTES, Text, head_lines, text_of

@@ -27,9 +27,9 @@ import numpy as np
 
 from acquisition.errors import FormatError
 from acquisition.recordings.sampling.timing import Formula
-from acquisition.recordings.tables.cells import parse_number
 from acquisition.recordings.tables.format import ColumnFormat
 from acquisition.recordings.tables.headings import name_and_unit
+from acquisition.recordings.tables.numbers import parse_number
 from acquisition.recordings.tables.rows import read_rows
 from acquisition.recordings.tables.table import Column, Table
 from acquisition.recordings.tables.text import Text, decode, is_text, text_of

@@ -10,8 +10,8 @@ import numpy as np
 
 from acquisition.block import F8
 from acquisition.errors import FormatError
-from acquisition.recordings.tables.cells import parse_number
 from acquisition.recordings.tables.headings import Heading
+from acquisition.recordings.tables.numbers import parse_number
 from acquisition.recordings.tables.table import Column, Table, side_by_side
 from acquisition.recordings.tables.text import decode, head_lines
 

@@ -15,15 +15,12 @@ import re
 from collections.abc import Iterator, Sequence
 
 from acquisition.recordings.tables.format import text_format
-from acquisition.recordings.tables.headings import Heading, is_time, name_and_unit, split_heading, words
+from acquisition.recordings.tables.headings import Heading, is_time, name_and_unit, split_heading
 from acquisition.recordings.tables.table import Header
 from acquisition.recordings.tables.text import Text
+from acquisition.recordings.tables.vocabulary import MOTION
 
 _CAPSTONE = re.compile(r"(?P<quantity>.*\S)\s+(?P<run>\S+ #\s?\d+|Run \d+)")
-_QUANTITIES = words(
-    "position velocity acceleration posizione velocità velocita accelerazione ort weg geschwindigkeit beschleunigung "
-    "vitesse accélération posición velocidad aceleración 位置 速度 加速度"
-)
 _DATASTUDIO = re.compile(r"(?P<name>[^\t;]+), (?P<run>\S+ #\s?\d+)\s*")
 _DATASTUDIO_LINE = re.compile(rb"\n([^\t;\n]+, [^\s]+ #[ \t]?\d+[ \t]*)(?=\n)")
 
@@ -38,10 +35,8 @@ def capstone(lines: Sequence[str]) -> Header | None:
         return Header(f'headings in line 1 end in a run, "{run}"', 1, mark, headings)
     names = [cell.lower() for cell in cells]
     # A comment mark shows that the line comes from another program.
-    is_localised = (
-        len(names) > 1 and names[0][:1] not in "#%" and is_time(names[0]) and _QUANTITIES.issuperset(names[1:])
-    )
-    if not is_localised:
+    is_localised = len(names) > 1 and names[0][:1] not in "#%" and is_time(names[0]) and MOTION.issuperset(names[1:])
+    if not is_localised or not re.search(r"\d", "".join(lines[1:2]) or "0"):  # else units follow in a line of their own
         return None
     return Header(f'line 1 is the headings "{mark.join(cells)}"', 1, mark, [Heading(cell) for cell in cells])
 

@@ -14,13 +14,13 @@ import numpy as np
 
 from acquisition.errors import FormatError
 from acquisition.line_numbers import UNIT_OF_WORD, Number, find_distance, has_decimal_comma, numbers
-from acquisition.recordings.tables.cells import CLOCK, UNREAD_CELL, clock_times
 from acquisition.recordings.tables.format import ColumnFormat
 from acquisition.recordings.tables.headings import Heading, is_time
 from acquisition.recordings.tables.layout import runs_forward
-from acquisition.recordings.tables.rows import count_from_first
+from acquisition.recordings.tables.numbers import UNREAD_CELL
 from acquisition.recordings.tables.table import Column, Lines, Table, side_by_side
 from acquisition.recordings.tables.text import Text, in_turn, is_text, text_of
+from acquisition.recordings.tables.times import CLOCK, clock_times, count_from_first
 
 _FEWEST, _SHARE, _MOST, _HEAD = 3, 0.6, 40, 120
 _BRACKETS = re.compile(r"\s*[(\[]")  # as Python prints tuples and lists

@@ -17,9 +17,9 @@ import numpy as np
 
 from acquisition.errors import FormatError
 from acquisition.recordings.families.markup import BLANKS, read_markup, tables_of
-from acquisition.recordings.tables.cells import parse_number
 from acquisition.recordings.tables.format import ColumnFormat
 from acquisition.recordings.tables.headings import Heading
+from acquisition.recordings.tables.numbers import parse_number
 from acquisition.recordings.tables.table import Table
 
 if TYPE_CHECKING:

@@ -23,9 +23,9 @@ import numpy as np
 
 from acquisition.errors import FormatError
 from acquisition.recordings.families.markup import MOST_XML_BYTES, begins, numbers_of, read_markup, tables_of
-from acquisition.recordings.tables.cells import parse_number
 from acquisition.recordings.tables.format import text_format
 from acquisition.recordings.tables.headings import Heading, headings_of, is_time, name_and_unit, split_heading, unique
+from acquisition.recordings.tables.numbers import parse_number
 from acquisition.recordings.tables.table import Header, Table
 from acquisition.recordings.tables.text import HEAD_BYTES, Text
 

@@ -22,8 +22,8 @@ from acquisition.recordings.sampling.flags import (
     value_traps,
 )
 from acquisition.recordings.sampling.timing import ChannelRows, find_timing
-from acquisition.recordings.tables.cells import EMPTY_CELL, I1, UNREAD_CELL, scaled, usual_decimals
 from acquisition.recordings.tables.choose import choose_channel, measure
+from acquisition.recordings.tables.numbers import EMPTY_CELL, I1, UNREAD_CELL, scaled, usual_decimals
 from acquisition.recordings.tables.samples import Samples
 from acquisition.recordings.tables.table import Column, Lines, Table, names_apart
 from acquisition.units import TIMES, Measure, time_unit

@@ -16,6 +16,7 @@ from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.sampling.timing import median, rate_needed
 from acquisition.recordings.tables.headings import BRACKETED, name_and_unit
 from acquisition.recordings.tables.table import Column, Table
+from acquisition.recordings.tables.vocabulary import DERIVED, OSCILLATES, POSITION_WORDS, UNIT_OF_NAME
 from acquisition.units import MEASURES, TIMES, Measure, measure_of, time_unit, unit_words
 
 _SLOW_S = 0.999
@@ -26,27 +27,9 @@ _LATE = 2e4
 _FIRST_ROWS = 50
 _SOME = 20_000
 _FEWEST_ROWS, _FEWEST_TURNS, _MOST_NAMES = 20, 4, 4
-_OSCILLATES = re.compile(
-    r"(?<![^\W\d_])(dist|pos|abst|weg|height|höhe|altura|range|auslenk|elong|displ|angle|winkel|theta|θ|phi|φ|gyr|rot|"
-    r"vel|acc|beschl|versn|force|kraft|volt|spannung|ch\d|signal|ampl|echo|[xyz](?![^\W_]))|column \d",
-    re.IGNORECASE,
-)
 _SHARE_OF_RESTARTS = 0.2
 _EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
 """Units of times since 1970, each with the minimum of the numbers to which it applies."""
-_POSITION = re.compile(
-    r"(?<![^\W\d_])(dist|pos|abst|weg|height|höhe|altura|rang|auslenk|elong|displ|[xyz](?![^\W_])|ang)|winkel|theta|θ|phi|φ"
-)
-_DERIVED = re.compile(r"abs|magnitude|total|betrag|norm|fft|command|setpoint|soll|error|status|sum")
-_LIKELY = (
-    (re.compile(r"gyr|omega|ω|ang\w*[ _.]*(vel|speed|ges)|winkelges|^g[xyz](?![^\W_])", re.IGNORECASE), "rad/s"),
-    (re.compile(r"acc|beschl|versn|^a[xyz](?![^\W_])|g[-_ ]?f|^ac[xyz]", re.IGNORECASE), "m/s2"),
-    (re.compile(r"vel|speed|^(?-i:v)(?![^\W\d_])|^(?-i:v)[xyz](?![^\W_])|geschw", re.IGNORECASE), "m/s"),
-    (re.compile(r"theta|θ|phi|φ|(?<![^\W\d_])(ang|rad)|winkel|rotat|roll|pitch|yaw", re.IGNORECASE), "rad"),
-    (re.compile(r"volt|^V(?![^\W\d_])|spannung|^ch|signal|tens|^ai?\d|ampl", re.IGNORECASE), "V"),
-    (re.compile(r"force|kraft|forza|fuerza", re.IGNORECASE), "N"),
-)
-
 Channel = tuple[Table, Column]
 
 
@@ -139,7 +122,7 @@ def _may_oscillate(column: Column, alone: bool) -> bool:
     values = column.values[:_SOME][np.isfinite(column.values[:_SOME])]
     steps = np.diff(values)
     turns = np.count_nonzero(np.diff(np.sign(steps[steps != 0]))) >= _FEWEST_TURNS
-    named = column.measure is not None or _OSCILLATES.search(column.name)
+    named = column.measure is not None or OSCILLATES.search(column.name)
     return bool(turns and (named or (alone and np.var(steps) < np.var(values))))
 
 
@@ -160,8 +143,8 @@ def _varies(values: F8) -> bool:
 def _unlikely(column: Column) -> tuple[bool, bool, float]:
     """Return a key that puts likely channels first: positions, then by unit, the axis that moves most before others."""
     plain = column.name.lower()
-    named = column.is_length or bool(_POSITION.search(plain))
-    derived = bool(_DERIVED.search(plain))
+    named = column.is_length or bool(POSITION_WORDS.search(plain))
+    derived = bool(DERIVED.search(plain))
     has_unit = column.measure is not None
     some = _some_of(column)
     with np.errstate(all="ignore"):  # a file may have numbers whose squares are infinite
@@ -248,7 +231,7 @@ def _missing_times(columns: Sequence[Column], table: Table, column: Column, answ
 
 
 def _unit_needed(column: Column) -> MissingItem:
-    likely = next((unit for words, unit in _LIKELY if words.search(column.name)), "m")
+    likely = next((unit for words, unit in UNIT_OF_NAME if words.search(column.name)), "m")
     example = "1" if column.unit else likely
     others = (unit for unit in MEASURES if unit != unit_words(example))
     return MissingItem(Missing.UNIT, (example, *others), example, of=column.name, stated=column.unit)

@@ -7,30 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from acquisition.recordings.tables.vocabulary import BESIDE_TIME, TIME_WORDS, UNCERTAINTIES
 from acquisition.units import measure_of, time_unit, unit_words
 
-
-def words(text: str) -> frozenset[str]:
-    """Return the words in a text."""
-    return frozenset(text.split())
-
-
-_TIME_WORDS = words(
-    "time times t elapsed timestamp seconds sec secs seg millis milliseconds ms msec micros microseconds us µs μs "
-    "usec nanos nanoseconds ns zeit tempo tempi temps tiempo tiempos tijd "
-    "tid czas čas aika idő zaman время 时间 時間 시간"
-)
-_BESIDE_TIME = words(
-    "axis value stamp data set run latest elapsed relative absolute since start velocity acceleration raw sensor gps "
-    "system rel abs"
-)
-"""Words that may accompany the word for time in a time column's name; other words denote, for example, a period."""
 _WORDS = re.compile(r"[^\W\d_]+\d*|\d+")
 _CAMEL = re.compile(r"(?<=[a-z])(?=[A-Z])")
-_UNCERTAIN = re.compile(
-    r".*\b(u?n?certain\w*|err\w*|sigma|std|incert\w*|unsicher\w*|fehler|sd)\b.*|[dδΔσu][_ ]?[a-zθφ]|[a-zθφ]'|[\d.,]+",
-    re.IGNORECASE,
-)
 BRACKETED = re.compile(r"(?P<name>.*?)\s*[(\[<](?P<unit>[^()\[\]<>]*)[)\]>]\s*")
 _NO_UNIT = re.compile(r"\d+|.*:.*")  # text in brackets that is the number of a channel, or a remark
 _SLASH = re.compile(r"(?P<name>.*?\S)\s*/\s*(?P<unit>[^\s/]+(?:/[^\s/]+)?)")
@@ -109,16 +90,16 @@ def _ends(name: str, unit: str) -> bool:
 def is_time(name: str) -> bool:
     """Return whether a column's name denotes time, in one of a dozen languages."""
     all_words = [word.rstrip("0123456789") or word for word in _WORDS.findall(_CAMEL.sub(" ", name).lower())]
-    time_words = [word for word in all_words if word in _TIME_WORDS]
+    time_words = [word for word in all_words if word in TIME_WORDS]
     others = [word for word in all_words if word not in time_words]
-    if not time_words or all_words[0].isdecimal() or (len(all_words[0]) == 1 and all_words[0] not in _TIME_WORDS):
+    if not time_words or all_words[0].isdecimal() or (len(all_words[0]) == 1 and all_words[0] not in TIME_WORDS):
         return False
-    return all(len(word) == 1 or word.isdecimal() or word in _BESIDE_TIME for word in others)
+    return all(len(word) == 1 or word.isdecimal() or word in BESIDE_TIME for word in others)
 
 
 def is_uncertainty(name: str) -> bool:
     """Return whether a column's name denotes the uncertainty of another column."""
-    return bool(_UNCERTAIN.fullmatch(name.strip()))
+    return bool(UNCERTAINTIES.fullmatch(name.strip()))
 
 
 def split_heading(line: str, mark: str = "") -> tuple[list[str], str]:

@@ -12,9 +12,11 @@ import numpy as np
 from acquisition.block import F8
 from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.sampling.timing import Formula
-from acquisition.recordings.tables.cells import CLOCK, parse_number
 from acquisition.recordings.tables.headings import Heading, heading_of, is_time, is_uncertainty, split_heading
+from acquisition.recordings.tables.numbers import is_lost, parse_number
 from acquisition.recordings.tables.table import Header
+from acquisition.recordings.tables.times import CLOCK
+from acquisition.recordings.tables.vocabulary import INDEX, NEUTRAL, NUMBERED, SPAN
 from acquisition.units import measure_of, time_unit
 
 _MARKS = ("\t", ";", ",", "")
@@ -29,16 +31,9 @@ _BRACKETED = re.compile(r"\([^()]*\)|\[[^\[\]]*\]")
 _TOKEN = re.compile(r"[^\s(\[]+(?:\s*[(\[][^)\]]*[)\]])?")
 _QUANTITY = re.compile(r"[-+]?\d+(?:[.,]\d*)? ?([^\W\d_]+)")  # 26.9 cm, as sketches print it
 _SEP = re.compile(r"[\ufeff\"]*sep=(.)")  # a line of Excel
-_NUMBERED = re.compile(r".*(index|sample|frame|number|count|row|seq)s?", re.IGNORECASE)
-_INDEX = frozenset(("", "n", "i", "nr", "no", "index", "sample", "samples", "frame", "row", "step", "id", "count", "#"))
 _FIRST_NUMBERS = 10  # row numbers begin below this; the first may be missing, in rows unlike the others
-_NEUTRAL = re.compile(
-    r"|x|(?-i:t)|x[-_ ]?(axis|value|achse)|(column|col|spalte|colonna|columna|var|field|unnamed:)[-_ ]?\d+",
-    re.IGNORECASE,
-)
-"""Names that do not prevent a column from being read as the times."""
-_SPAN = re.compile(r"^(?-i:T)\b|^[Ττ]|period|durat|dauer|half|halb|interval|tau|delay|[dΔ]t|mean|10", re.IGNORECASE)
-"""Names of durations, which are not times of samples."""
+_NONE = ("", "lost")
+"""Kinds of cells that may stand in any column."""
 _SPARSE = 0.2  # minimum share of rows with a number in a column of samples
 _CAPITAL = re.compile(r"(?<![^\W\d_])T(?![^\W\d_])")
 
@@ -82,6 +77,11 @@ def _split_by(lines: Sequence[str], mark: str) -> Header | None:
         width = max((len(row) for row in probe if _is_row(row)), default=0) if mark else len(first)
         like = [_alike(row, first, width, mark) for row in probe]
         if sum(like[:_FEWEST]) == _FEWEST and sum(like) >= _SOUND * len(like):
+            below = [*zip(*(row for row in cells[at:] if len(row) == width), strict=True)]
+            if any(all(cell.startswith("(") for cell in column) for column in below):
+                continue  # numbers that are all in brackets are not negative
+            while at and _belongs(kinds[at - 1], cells[at - 1], below):
+                at -= 1
             rows = [
                 cells_of_row
                 for cells_of_row, row in zip(cells[at:], kinds[at:], strict=True)
@@ -108,6 +108,8 @@ def _kind(cell: str) -> str:
         return ""
     if parse_number(cell) is not None:
         return "number"
+    if is_lost(cell):
+        return "lost"
     if (quantity := _QUANTITY.fullmatch(cell)) and measure_of(quantity[1]) is not None:
         return "mixed"
     if CLOCK.fullmatch(cell):
@@ -119,14 +121,31 @@ def _kind(cell: str) -> str:
 
 def _is_row(kinds: Sequence[str]) -> bool:
     values = kinds.count("number") + kinds.count("clock")
-    return "number" in kinds and values >= kinds.count("text") and "mixed" not in kinds
+    words = kinds.count("text") + kinds.count("lost")
+    return "number" in kinds and values >= words and "mixed" not in kinds
 
 
 def _alike(kinds: Sequence[str], first: Sequence[str], width: int, mark: str) -> bool:
     """Return whether a line is a row like the first: text below text, numbers below numbers, or empty cells."""
     if not _is_row(kinds) or (not mark and len(kinds) != width) or len(kinds) > width:
         return False
-    return all(a == b or "" in (a, b) for a, b in zip(kinds, first, strict=False))
+    return all(a == b or a in _NONE or b in _NONE for a, b in zip(kinds, first, strict=False))
+
+
+def _belongs(kinds: Sequence[str], cells: Sequence[str], below: Sequence[tuple[str, ...]]) -> bool:
+    """Return whether a line above rows of numbers is one of them: each cell is a number or a word among numbers.
+
+    ``below`` are the cells of the rows in each column.
+    """
+    return (
+        len(cells) == len(below)
+        and "number" in kinds
+        and all(
+            kind in ("number", "clock", "lost")
+            or (kind == "text" and cell in column and any(parse_number(each) is not None for each in column))
+            for kind, cell, column in zip(kinds, cells, below, strict=True)
+        )
+    )
 
 
 def _with_names(lines: Sequence[str], start: int, mark: str, width: int) -> Header:
@@ -287,7 +306,7 @@ def _is_even(column: F8) -> bool:
 def is_aside(heading: Heading, column: F8, others: bool) -> bool:
     """Return whether a column is row numbers (if ``others`` may be the times), an uncertainty, or nearly empty."""
     name = " ".join(heading.name.lower().replace("_", " ").split())
-    index = others and are_row_numbers(column) and (name in _INDEX or bool(_NUMBERED.fullmatch(name)))
+    index = others and are_row_numbers(column) and (name in INDEX or bool(NUMBERED.fullmatch(name)))
     return index or is_uncertainty(name) or bool(np.mean(np.isfinite(column)) < _SPARSE)
 
 
@@ -300,7 +319,7 @@ def times_by_name(headings: Sequence[Heading], columns: Sequence[F8]) -> list[in
         column
         for column, each in enumerate(headings)
         if (is_time(each.name) and not _CAPITAL.search(each.name) and not (each.unit and time_unit(each.unit) is None))
-        or (column == 0 and time_unit(each.unit) is not None and not _SPAN.search(each.name) and _is_even(columns[0]))
+        or (column == 0 and time_unit(each.unit) is not None and not SPAN.search(each.name) and _is_even(columns[0]))
     ]
     return [column for column in named if runs_forward(columns[column])]
 
@@ -315,7 +334,7 @@ def times_by_steps(headings: Sequence[Heading], columns: Sequence[F8]) -> int | 
     fit = [
         column
         for column, each in enumerate(headings)
-        if _NEUTRAL.fullmatch(each.name) and (not each.unit or time_unit(each.unit) is not None)
+        if NEUTRAL.fullmatch(each.name) and (not each.unit or time_unit(each.unit) is not None)
         if runs_forward(columns[column]) and not are_row_numbers(columns[column])
     ]
     even = [column for column in fit if _is_even(columns[column])]

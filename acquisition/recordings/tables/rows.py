@@ -11,18 +11,10 @@ import numpy as np
 from acquisition.block import B1, F8
 from acquisition.errors import FormatError
 from acquisition.recordings.recording import FormatIssue
-from acquisition.recordings.tables.cells import (
-    EMPTY_CELL,
-    EXPONENT,
-    I1,
-    UNREAD_CELL,
-    clock_times,
-    is_cut,
-    read_cells,
-    split_page,
-)
+from acquisition.recordings.tables.numbers import EMPTY_CELL, EXPONENT, I1, UNREAD_CELL, is_cut, read_cells, split_page
 from acquisition.recordings.tables.table import Column, Lines, Table
 from acquisition.recordings.tables.text import Text
+from acquisition.recordings.tables.times import clock_times, count_from_first
 
 _MOST_EMPTY = 4_000_000
 """Cells that rows may lack, in addition to one for every byte, before the table counts as damaged."""
@@ -86,20 +78,12 @@ def read_rows(path: str, text: Text, first: int, stop: int, mark: str, clock: in
     return Table(tuple(columns), lines=where, traps=traps)
 
 
-def count_from_first(column: Column) -> None:
-    """Make times of day seconds since the first one, in place; midnight may lie between them."""
-    filled = np.flatnonzero(column.forms >= 0)
-    if filled.size:
-        at = column.values[filled]
-        days = np.concatenate(([0.0], np.cumsum(np.diff(at) < -43200.0)))
-        column.values[filled] = np.round(at - at[0] + 86400.0 * days, column.forms[filled].max())
-
-
 def _decimal_marks(path: str, columns: Sequence[Column], commas: Sequence[B1]) -> tuple[FormatIssue, ...]:
     """Refuse ``1,234`` if its comma may separate thousands: as a decimal mark it gives an error of a factor 1000.
 
     A comma or point is a decimal mark if anywhere it is not followed by exactly three digits, or follows a zero or four
-    digits. Return a remark if a comma was read as a decimal mark, which nothing confirms.
+    digits, or if the whole numbers next to such cells are about as large. Return a remark if a comma was read as a
+    decimal mark, which nothing confirms.
     """
     certain, doubtful = set(), []
     for column, comma in zip(columns, commas, strict=True):
@@ -110,14 +94,22 @@ def _decimal_marks(path: str, columns: Sequence[Column], commas: Sequence[B1]) -
             if (marked & ~group).any():
                 certain.add(mark)
             elif marked.any():
-                whole = size[forms == 0]
                 shown = f"{column.values[int(marked.argmax())]:.3f}".replace(".", mark)
-                doubtful.append((mark, shown, bool(whole.size and whole.max() < 1000.0)))
+                doubtful.append((mark, shown, _may_be_thousands(size, marked, forms == 0)))
     doubtful = [each for each in doubtful if each[0] not in certain]
-    for _, shown, small in doubtful:
-        if certain or small:
+    for _, shown, thousands in doubtful:
+        if certain or thousands:
             raise FormatError(path, f'"{shown}" may have a thousands separator or a decimal mark', _REMEDY)
     if not doubtful or any(mark == "." for mark, _, _ in doubtful):
         return ()
     message = f'the comma in "{doubtful[0][1]}" was read as a decimal comma, not as a thousands separator'
     return (FormatIssue("decimal_comma", message),)
+
+
+def _may_be_thousands(size: F8, marked: B1, whole: B1) -> bool:
+    """Return whether a mark may separate thousands: 1.000 next to 950 may be, 26.000 next to 27 is none."""
+    if not whole.any() or size[whole].max() >= 1000.0:
+        return False
+    pairs = np.flatnonzero((marked[1:] & whole[:-1]) | (whole[1:] & marked[:-1]))
+    low, high = np.minimum(size[pairs], size[pairs + 1]), np.maximum(size[pairs], size[pairs + 1])
+    return not (pairs.size and (high <= 2.0 * low).all())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -13,13 +12,13 @@ import numpy as np
 from acquisition.block import B1, F8, I8
 from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.sampling.timing import Formula, median
-from acquisition.recordings.tables.cells import EMPTY_CELL, I1
 from acquisition.recordings.tables.headings import Heading, role_of, unique
+from acquisition.recordings.tables.numbers import EMPTY_CELL, I1
+from acquisition.recordings.tables.vocabulary import ACCELERATION
 from acquisition.units import Measure, measure_of
 
 _SET_BACK, _MOST_SET, _FEWEST_ROWS = 50.0, 3, 50
 """A clock was set back if it steps back by so many usual steps, at most so often, with so many rows in each part."""
-_ACCELERATION = re.compile(r"acc|beschl|versn|g[-_ ]?f|^a(?![^\W\d_])|^a[xyz](?![^\W_])", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,7 +65,7 @@ class Column:
         The unit g means standard gravity if the name denotes an acceleration; otherwise it means gram.
         """
         measure = measure_of(self.unit if self.unit != "G" else "g")
-        grams = measure is not None and measure.symbol in ("g", "mg") and not _ACCELERATION.search(self.name)
+        grams = measure is not None and measure.symbol in ("g", "mg") and not ACCELERATION.search(self.name)
         return None if grams else measure
 
     @property

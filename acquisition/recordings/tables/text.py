@@ -11,6 +11,7 @@ import numpy as np
 
 from acquisition.block import I8
 from acquisition.errors import FormatError
+from acquisition.recordings.tables.numbers import plain
 
 HEAD_BYTES = 8192
 """Number of bytes at the start of a file from which a format recognises it."""
@@ -28,7 +29,7 @@ _HEAD_SPAN = 1 << 16
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Text:
-    """A text as bytes in which every digit, sign and separator is one byte; a LF ends every line but perhaps the last.
+    """A text as bytes in which every digit, sign and separator is ASCII; a LF ends every line but perhaps the last.
 
     ``starts`` are the positions of its lines, and its end. ``zeros`` counts zero bytes that were left out at its end.
     """
@@ -42,6 +43,8 @@ class Text:
         """Return the text of a file's bytes."""
         if encoding := _utf16(data[:HEAD_BYTES]):
             data = data.decode(encoding, errors="replace").removeprefix("\ufeff").encode("utf-8", "replace")
+        if not data.isascii() and (numbered := plain(printed := decode(data))) != printed:
+            data = numbered.encode("utf-8", "replace")
         whole = data.rstrip(b"\0\x1a") if data[-1:] in (b"\0", b"\x1a") else data
         text = whole.removeprefix(codecs.BOM_UTF8).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
         starts = np.flatnonzero(np.frombuffer(text, np.uint8) == ord("\n")) + 1
@@ -179,7 +182,7 @@ def _utf16(head: bytes) -> str:
 
 def head_lines(head: bytes) -> list[str]:
     """Return the lines of the first bytes of a file; one empty line if the file is binary."""
-    return decode(head).replace("\r\n", "\n").replace("\r", "\n").split("\n") if is_text(head) else [""]
+    return plain(decode(head)).replace("\r\n", "\n").replace("\r", "\n").split("\n") if is_text(head) else [""]
 
 
 def says_simulated(text: str) -> bool:

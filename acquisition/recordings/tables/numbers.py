@@ -1,4 +1,12 @@
-"""Cells of rows of text as numbers: their values as printed, and how many decimals are printed."""
+"""The grammar of numbers: a cell of text as a number, its value as printed, and how many decimals are printed.
+
+1. A number has digits of one script, at most one point or comma, and perhaps an exponent after E, or D of Fortran.
+2. :func:`plain` gives signs, digits and exponents of other scripts and languages their ASCII form, for a whole text.
+3. ``(12.3)`` and ``12.3-`` of accounting are negative.
+4. Words for an overload or a lost value, dashes, and numbers from 9e36 on, which instruments send for an overload, are
+   missing samples. All other text is not a number.
+5. Thousands separators are refused; a mark that may be one needs evidence that it is a decimal mark.
+"""
 
 from __future__ import annotations
 
@@ -6,20 +14,33 @@ import contextlib
 import csv
 import math
 import re
+import unicodedata
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.block import B1, F8
+from acquisition.recordings.tables.vocabulary import LOST
 
 I1 = NDArray[np.int8]
 NAN_CELL, EMPTY_CELL, UNREAD_CELL = -1, -2, -3
-"""In place of a number of decimals: the word NaN, an empty cell, a cell that is not a number."""
+"""In place of a number of decimals: NaN or another word for a missing number, an empty cell, any other text."""
 EXPONENT = 64
 """Added to the number of decimals of the mantissa if a number has an exponent."""
 
-_CELL = re.compile(r"([+-]?(?:\d+[.,]?(\d*)|[.,](\d+)))(?:[eE]([+-]?\d{1,3}))?", re.ASCII)
+_CELL = re.compile(r"([+-]?(?:\d+[.,]?(\d*)|[.,](\d+)))(?:[eEdD]([+-]?\d{1,3}))?", re.ASCII)
+_ACCOUNTED = re.compile(r"\((\d[\d.,]*)\)|(\d[\d.,]*)-", re.ASCII)
+_NAN = re.compile(r"[+-]?nan", re.IGNORECASE)
+_LOST = re.compile(r"[-+±>]?∞|[-–—−]+|…|\*+|\?+|\.{2,}")
+_OVERLOAD = 9e36
+_MINUS = re.compile(
+    r"(?:(?<![^\W_])|(?<=\d[eE^]))[\u2212\u2013\ufe63\uff0d](?=[.,\u066b]?[\d∞])|(?<=\d)[\u2212\u2013](?=[\s;]|$)"
+)
+_POWER = re.compile(r"(?<=\d)[ \xa0]?(?:[×·][ \xa0]?10\^?|[اأ]س)(?=[-+\u2212\d])")
+_SPACE = re.compile(r"(?<!\d)[\xa0\u2007\u2009\u202f]|[\xa0\u2007\u2009\u202f](?!\d)")
+_MARKS = {0x66B: ".", 0x66C: "'", 0x60C: ",", 0x61B: ";", 0xFF0E: ".", 0xFF0C: ",", 0xFF1B: ";"}
+_NO_WIDTH = dict.fromkeys((0x200B, 0x200E, 0x200F, 0x61C))
 _LONGEST = 64  # bytes of a cell that are examined; longer cells are rare and are read one by one
 _DIGIT, _SIGN, _MARK, _E, _OTHER = 1, 2, 3, 4, 5
 _KINDS = np.full(256, _OTHER, np.uint8)
@@ -27,13 +48,16 @@ for _kind, _characters in ((0, b"\0"), (_DIGIT, b"0123456789"), (_SIGN, b"+-"), 
     _KINDS[list(_characters)] = _kind
 _DAMAGE = bytes.maketrans(b"\0\x0b\x0c\x1c\x1d\x1e\x1f", b"?" * 7)
 """Control characters that numpy or ``split`` would ignore: a number next to one may have lost digits."""
-CLOCK = re.compile(
-    r"'?(?P<date>\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ,]*)?"
-    r"(?:(?P<h>\d{1,2}):(?P<m>\d{1,2}):(?P<s>\d{1,2})(?:[.,](?P<part>\d{1,9})|::?(?P<ms>\d{1,3}))?"
-    r"|(?P<h2>\d{1,2}):(?P<m2>\d\d)|(?P<m3>\d{1,2}):(?P<s3>\d\d)[.,](?P<part3>\d{1,9}))"
-    r"\s*(?P<half>[aApP]\.?[mM]\.?)?(?:Z|[+-]\d\d:?\d\d)?",
-    re.ASCII,
-)
+
+
+def plain(text: str) -> str:
+    """Return a text whose numbers have ASCII digits, signs, exponents and blanks, in whichever script they are."""
+    if text.isascii():
+        return text
+    others = [each for each in set(text) if each > "\x7f"]
+    digits = {ord(each): str(unicodedata.decimal(each)) for each in others if each.isdecimal()}
+    text = text.translate({**(_MARKS if digits else {}), **_NO_WIDTH, **digits})
+    return _MINUS.sub("-", _POWER.sub("e", _SPACE.sub(" ", text)))
 
 
 def cell(text: str) -> tuple[float, int]:
@@ -44,42 +68,27 @@ def cell(text: str) -> tuple[float, int]:
     if not text:
         return math.nan, EMPTY_CELL
     match = _CELL.fullmatch(text)
+    if match is None and (accounted := _ACCOUNTED.fullmatch(text)):
+        text = f"-{accounted[1] or accounted[2]}"
+        match = _CELL.fullmatch(text)
     if match is None:
-        return math.nan, NAN_CELL if text.lower() in ("nan", "-nan", "+nan") else UNREAD_CELL
-    value = float(text.replace(",", "."))
-    if not math.isfinite(value):
-        return math.nan, UNREAD_CELL
+        return math.nan, NAN_CELL if _NAN.fullmatch(text) or is_lost(text) else UNREAD_CELL
+    value = float(text.replace(",", ".").replace("d", "e").replace("D", "e"))
+    if not abs(value) < _OVERLOAD:
+        return math.nan, NAN_CELL
     decimals = min(len(match[2] or match[3] or ""), EXPONENT - 1)
     return value, decimals + (EXPONENT if match[4] else 0)
 
 
-def clock_s(cell: str) -> tuple[str, float, int] | None:
-    """Return the printed date, the second of the day and the number of decimals; None for any other text."""
-    match = CLOCK.fullmatch(cell)
-    if match is None:
-        return None
-    hour = int(match["h"] or match["h2"] or 0)
-    hour = hour % 12 + 12 * (match["half"][0] in "pP") if match["half"] else hour
-    part = f"{match['ms']:0>3}" if match["ms"] else match["part"] or match["part3"] or ""
-    decimals = len(part)
-    seconds = float(f"{match['s'] or match['s3'] or 0}.{part}")
-    at = hour * 3600 + int(match["m"] or match["m2"] or match["m3"]) * 60 + seconds
-    return (match["date"] or "").strip(" ,T"), round(at, decimals), decimals
-
-
-def clock_times(cells: Sequence[bytes]) -> tuple[F8, I1, B1]:
-    """Return times of day in seconds, the decimals of each, and a mask without commas, as :func:`read_cells` does."""
-    values, decimals = np.full(len(cells), np.nan), np.full(len(cells), UNREAD_CELL, np.int8)
-    for row, each in enumerate(cells):
-        if (time := clock_s(each.strip(b'"').decode("latin-1"))) is not None:
-            _, values[row], decimals[row] = time
-    return values, decimals, np.zeros(values.size, bool)
+def is_lost(text: str) -> bool:
+    """Return whether a cell is a word or sign that stands in place of a number."""
+    return text.lower().lstrip("+-><") in LOST or bool(_LOST.fullmatch(text))
 
 
 def parse_number(text: str) -> float | None:
     """Return the number in a cell, which may be NaN; None for any other text."""
     value, decimals = cell(text)
-    return None if decimals in (EMPTY_CELL, UNREAD_CELL) else value
+    return None if decimals < NAN_CELL or (decimals == NAN_CELL and is_lost(text)) else value
 
 
 def split_page(page: bytes, delimiter: str) -> list[list[bytes]]:
@@ -140,7 +149,9 @@ def read_cells(cells: Sequence[bytes]) -> tuple[F8, I1, B1]:
             decimals[unfixed] = np.minimum(places - exponent, EXPONENT - 1)[unfixed] + EXPONENT
             unfixed &= ~np.isfinite(values)
     for row in np.flatnonzero(unfixed).tolist():
-        values[row], decimals[row] = cell(cells[row].decode("latin-1"))
+        values[row], decimals[row] = cell(cells[row].decode("utf-8", "replace"))
+    beyond = np.abs(values) >= _OVERLOAD
+    values[beyond], decimals[beyond] = np.nan, NAN_CELL
     return values, decimals, comma.any(axis=1)
 
 
