@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
@@ -79,6 +80,67 @@ def _of(each: Unit, unit: str) -> str:
         return " ".join(above) or ("1" if each.metre else "")
     divided_by = below[0] if len(below) == 1 else f"({' '.join(below)})"
     return f"{' '.join(above) or '1'}/{divided_by}"
+
+
+# Exponents of kilogram, metre, second, radian and volt in each unit that results have.
+_BASE = {
+    "kg": (1, 0, 0, 0, 0),
+    "m": (0, 1, 0, 0, 0),
+    "s": (0, 0, 1, 0, 0),
+    "rad": (0, 0, 0, 1, 0),
+    "V": (0, 0, 0, 0, 1),
+    "N": (1, 1, -2, 0, 0),
+    "J": (1, 2, -2, 0, 0),
+    "Hz": (0, 0, -1, 0, 0),
+    "Pa": (1, -1, -2, 0, 0),
+}
+# Units in which products and powers are written, the first of each dimension.
+_WRITTEN = (
+    "kg", "m", "s", "rad", "V", "N", "J", "1/s", "N/m", "m/s", "m/s^2", "rad/s", "m^2", "s^2", "1/m", "1/(m s)",
+    "1/(rad s)", "J/kg", "kg m^2", "N s", "m^2/s", "V/s", "1/(V s)", "Pa",
+)  # fmt: skip
+
+
+def exponents_of(unit: str | None) -> tuple[float, ...] | None:
+    """Return the exponents of a unit such as ``1/(m s)``; None for one that is not made of known ones."""
+    if unit is None:
+        return None
+    above, _, below = unit.partition("/")
+    total = [0.0] * 5
+    for sign, part in ((1, above), (-1, below.strip("()"))):
+        for factor in filter(lambda factor: factor != "1", part.split()):
+            match = re.fullmatch(r"([A-Za-z]+)(?:\^(-?\d+))?", factor)
+            if match is None or match[1] not in _BASE:
+                return None
+            for i, exponent in enumerate(_BASE[match[1]]):
+                total[i] += sign * exponent * int(match[2] or 1)
+    return tuple(total)
+
+
+_NAMES = {found: unit for unit in reversed(_WRITTEN) if (found := exponents_of(unit)) is not None}
+_NAMES[(0.0,) * 5] = ""
+
+
+def product_of(left: str | None, right: str | None, power: int) -> str | None:
+    """Return the unit of a product with a power of another; None if results have no such unit.
+
+    >>> product_of("N/m", "s^2", 1), product_of("m", "s", -1), product_of("N", "s^2", -1)
+    ('kg', 'm/s', None)
+    """
+    of_left, of_right = exponents_of(left), exponents_of(right)
+    if of_left is None or of_right is None:
+        return None
+    return _NAMES.get(tuple(a + power * b for a, b in zip(of_left, of_right, strict=True)))
+
+
+def power_of(unit: str | None, exponent: float) -> str | None:
+    """Return the unit of a power; None if results have no such unit.
+
+    >>> power_of("s", -1), power_of("m^2", 0.5), power_of("kg", 2)
+    ('1/s', 'm', None)
+    """
+    powers = exponents_of(unit)
+    return None if powers is None else _NAMES.get(tuple(float(exponent) * each for each in powers))
 
 
 def number(value: float, form: str = "") -> str:

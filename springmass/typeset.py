@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import replace
 
 from acquisition.errors import visible
 from pipeline.damping.select import Damping
@@ -91,7 +90,7 @@ def prefixed(estimate: Estimate) -> Estimate:
     for below, factor, unit in _PREFIXES.get(estimate.unit, ()):
         if 0.0 < size < below:
             value, u = (float(f"{x * factor:.15g}") for x in (estimate.value, estimate.u))
-            return replace(estimate, value=value, u=u, unit=unit)
+            return type(estimate)(value, u, unit)
     return estimate
 
 

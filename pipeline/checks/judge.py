@@ -17,12 +17,11 @@ from pipeline.checks.sensor import held, smoothed
 from pipeline.checks.shape import folded_shape
 from pipeline.motion.fitted import Fitted
 from pipeline.notice import Notice
-from pipeline.numerics.levels import FALSE_ALARM
 from pipeline.parts.lost_rows import LostRows
 from pipeline.samples.condition import Samples
 
-# The tests of the residual in order. Those that decide by a probability alone get an equal share of FALSE_ALARM.
-TESTS: tuple[Callable[[Residual, float], Outcome | None], ...] = (
+# The tests of the residual in order.
+TESTS: tuple[Callable[[Residual], Outcome | None], ...] = (
     folded_shape,
     held,
     smoothed,
@@ -48,7 +47,7 @@ def judge(
     if fitted.method != "equation":
         residual = residual_of(samples, fitted, filter_)
         for test in TESTS:
-            if (outcome := test(residual, FALSE_ALARM / len(TESTS))) is not None:
+            if (outcome := test(residual)) is not None:
                 outcomes.append(outcome)
                 residual = residual.less(outcome)
     numbers: dict[str, dict[str, float | str | None]] = {}

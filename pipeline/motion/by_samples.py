@@ -197,7 +197,7 @@ def _phase(phase: Phase, windows: Windows, best: _OfLaw) -> Phase:
         u = np.maximum(np.sqrt(windows.covariance[:, 1, 1]), 1e-12)
         columns = np.stack([np.ones(windows.t.size), windows.t - phase.middle], axis=1)
         line = solve_weighted(columns, replace(found, lag=None).total(windows.t), u)
-        omega = replace(omega, value=float(line.values[1]), u=phase.angular_frequency.u)
+        omega = Estimate(float(line.values[1]), phase.angular_frequency.u, omega.unit)
     at_start = wrapped(float(found.total(np.array([phase.t0]))[0]))
     start = Estimate(at_start, math.sqrt(float(gradient @ covariance @ gradient)), "rad")
     return replace(found, angular_frequency=omega, phase=start, backbone=backbone, small_swings=small)
@@ -209,5 +209,5 @@ def _rest(rest: Rest, best: _OfLaw, level: float) -> Rest:
     curve = level + best.model.rest(rest.t) @ still
     if best.model.degree:
         return replace(rest, curve=curve, drift=float(np.ptp(curve)))
-    mean = replace(rest.mean, value=float(curve[0]), u=math.sqrt(best.covariance[-1, -1]))
+    mean = Estimate(float(curve[0]), math.sqrt(best.covariance[-1, -1]), rest.mean.unit)
     return replace(rest, mean=mean, curve=curve)

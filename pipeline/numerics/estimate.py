@@ -3,92 +3,170 @@
 from __future__ import annotations
 
 import math
-import operator
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from uncertainties import UFloat, nominal_value, ufloat, umath
 
 from pipeline.numerics.levels import LIMIT
 from pipeline.track import F8
+from pipeline.units import power_of, product_of
+
+EXPONENT_ROUNDING = 1e-13
+"""Share of a value; a smaller u is left by correlations that cancel, as in period times frequency."""
 
 
-def _both_ways(operation: Callable[[Any, Any], Any]) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """Return an operation on an estimate and another number, and that with the two exchanged."""
+class Estimate(UFloat):  # type: ignore[misc]
+    """A number of the ``uncertainties`` package that knows its unit; it does not change.
 
-    def forwards(estimate: Estimate, other: Any) -> Any:
-        return operation(estimate.ufloat, other.ufloat if isinstance(other, Estimate) else other)
+    ``value`` and ``u`` are the number and its standard uncertainty, in ``unit``. Arithmetic and the functions of numpy
+    and ``uncertainties.umath`` keep uncertainty and correlations, and those of a copy are those of the original.
+    Products and powers keep a unit where it is one of those of results; otherwise it is None. There is no ``float()``,
+    which would drop the uncertainty. Two estimates are equal if value, u and unit are.
 
-    def backwards(estimate: Estimate, other: Any) -> Any:
-        return operation(other, estimate.ufloat)
-
-    return forwards, backwards
-
-
-@dataclass(frozen=True, slots=True, repr=False)
-class Estimate:
-    """A value with its standard uncertainty; it can be used in calculations like a number.
-
-    Results of arithmetic are :class:`uncertainties.UFloat` in SI units, or plain numbers where nothing is uncertain.
-    Estimates of one analysis record which variables they depend on, so that their correlations are kept.
-
+    Examples
+    --------
     >>> period = Estimate(0.7431, 0.0002, "s")
-    >>> period
-    0.74310(20) s
-    >>> 2 * period, period - period, float(period)
-    (1.4862+/-0.0004, 0.0+/-0, 0.7431)
+    >>> period, 1 / period, period - period
+    (0.74310(20) s, 1.34571(36) 1/s, 0 s)
+    >>> period * (1 / period)
+    1
+    >>> print(2 * period, f"{period:.1uS}", 0.2 * period**-2)
+    1.48620 +- 0.00040 s 0.7431(2) 0.36219 +- 0.00019
+    >>> print(f"{period.ufloat:.1u}")
+    0.7431+/-0.0002
     """
 
-    value: float  # in ``unit``
-    u: float  # standard uncertainty (coverage factor 1); 0 for a value that is taken as exact
-    unit: str = ""  # SI unit as printed, "" for a ratio
-    # The ``uncertainties.UFloat`` that the estimate was calculated from; without one it depends on no other. It is not
-    # passed on by ``dataclasses.replace``, whose result is another quantity.
-    variable: Any = field(default=None, compare=False, init=False)
+    __slots__ = ("_u", "unit")
+    unit: Any  # str, or None where no result has such a unit
+
+    def __init__(self, value: float, u: float | None, unit: str | None = "", *, of: Any = None) -> None:
+        """Make an estimate of a variable ``of`` the package; without one it depends on no other.
+
+        ``u`` is the standard uncertainty (coverage factor 1), 0 for an exact value; None takes that of the variable.
+        ``unit`` is the SI unit as printed, "" for a ratio.
+        """
+        of = ufloat(value, u) if of is None and u is not None and u > 0.0 else of
+        # The only private name of the package in this project: what makes an estimate depend on the same variables.
+        super().__init__(value, of._linear_part if isinstance(of, UFloat) else {})
+        self._u, self.unit = u, unit
 
     @classmethod
-    def of_variable(cls, x: Any, unit: str, u: float | None = None) -> Estimate:
+    def of_variable(cls, x: Any, unit: str | None, u: float | None = None) -> Estimate:
         """Return a variable of the ``uncertainties`` package or an exact number, with its u if that is known better."""
-        from uncertainties import nominal_value, std_dev
-
-        estimate = cls(float(nominal_value(x)), float(std_dev(x)) if u is None else u, unit)
-        object.__setattr__(estimate, "variable", x)
-        return estimate
+        return cls(nominal_value(x), u, unit, of=x)
 
     @property
-    def ufloat(self) -> Any:
-        """The estimate for calculations: an ``uncertainties.UFloat``, or the bare value if it is exact."""
-        if self.variable is None:
-            from uncertainties import ufloat
+    def value(self) -> float:
+        """The number, in ``unit``."""
+        return float(self.nominal_value)
 
-            # Cached, so that an estimate is always the same variable: x - x is 0 and not 0 +- 1.4 u.
-            object.__setattr__(self, "variable", ufloat(self.value, self.u) if self.u > 0 else self.value)
-        return self.variable
+    @property
+    def u(self) -> float:
+        """The standard uncertainty, in ``unit``."""
+        if self._u is None:
+            u = float(super().std_dev)
+            self._u = 0.0 if u <= EXPONENT_ROUNDING * abs(self.value) else u
+        return self._u
+
+    std_dev = s = u
+
+    @property
+    def ufloat(self) -> UFloat:
+        """The number without its unit, for a package that has units of its own: ``Quantity(x.ufloat, x.unit)``."""
+        return UFloat.__pos__(self)
 
     def __str__(self) -> str:
-        return format_value(self.value, self.u, self.unit)
+        return format_value(self.value, self.u, self.unit or "")
 
     def __repr__(self) -> str:
-        return in_brackets(self.value, self.u, self.unit)
+        return in_brackets(self.value, self.u, self.unit or "")
 
-    def __format__(self, spec: str) -> str:
-        return format(self.ufloat, spec) if spec else str(self)
+    def __format__(self, form: str) -> str:
+        return str(super().__format__(form)) if form else str(self)
 
-    def __float__(self) -> float:
-        return self.value
+    def __copy__(self) -> Estimate:
+        return self
 
-    __add__, __radd__ = _both_ways(operator.add)
-    __sub__, __rsub__ = _both_ways(operator.sub)
-    __mul__, __rmul__ = _both_ways(operator.mul)
-    __truediv__, __rtruediv__ = _both_ways(operator.truediv)
-    __pow__, __rpow__ = _both_ways(operator.pow)
+    def __deepcopy__(self, _: Any) -> Estimate:
+        return self  # a copy of its variables would be independent of them
 
-    def __neg__(self) -> Any:
-        return -self.ufloat
+    def __eq__(self, other: object) -> bool:
+        if isinstance(other, Estimate):
+            return (self.value, self.u, self.unit) == (other.value, other.u, other.unit)
+        return bool(super().__eq__(other))
+
+    def __bool__(self) -> bool:
+        return True  # an estimate is there, also if it is 0: `scene.air_temperature_c or TYPICAL_TEMPERATURE`
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+    def __hash__(self) -> int:
+        return hash(self.value)
+
+    def __abs__(self) -> Estimate:
+        return self if self.value >= 0.0 else -self
+
+    def __round__(self, digits: int = 0) -> Estimate:
+        return Estimate.of_variable(self - (self.value - round(self.value, digits)), self.unit)
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+def _operator(name: str, unit_of: Callable[[Any, Any], str | None]) -> None:
+    """Let an operation on estimates and its reflection return an estimate."""
+
+    def made(method: str, unit_of: Callable[[Any, Any], str | None]) -> Callable[[Any, Any], Any]:
+        calculate = getattr(UFloat, method)
+
+        def operate(self: Estimate, other: Any) -> Any:
+            x = calculate(self, other)
+            return Estimate.of_variable(x, unit_of(self, other)) if isinstance(x, UFloat) else x
+
+        return operate
+
+    setattr(Estimate, f"__{name}__", made(f"__{name}__", unit_of))
+    setattr(Estimate, f"__r{name}__", made(f"__r{name}__", lambda right, left: unit_of(left, right)))
+
+
+def _unit_of(x: Any) -> str | None:
+    """Return the unit of an operand; a plain number has none, an array or the package's own number may be anything."""
+    return x.unit if isinstance(x, Estimate) else "" if not isinstance(x, UFloat) else None
+
+
+def _sum(left: Any, right: Any) -> str | None:
+    # A sum of many begins with a plain 0.
+    units = {_unit_of(x) for x in (left, right) if isinstance(x, UFloat) or x != 0.0}
+    return units.pop() if len(units) == 1 else None
+
+
+def _power(base: Any, exponent: Any) -> str | None:
+    if isinstance(exponent, UFloat):
+        return "" if _unit_of(base) == _unit_of(exponent) == "" else None
+    return power_of(_unit_of(base), exponent)
+
+
+_operator("add", _sum)
+_operator("sub", _sum)
+_operator("mul", lambda left, right: product_of(_unit_of(left), _unit_of(right), 1))
+_operator("truediv", lambda left, right: product_of(_unit_of(left), _unit_of(right), -1))
+_operator("pow", _power)
+
+
+def _function(name: str, calculate: Callable[[Any], Any], unit_of: Callable[[Any], str | None]) -> None:
+    """Give estimates a method, which numpy calls for its function of the same name."""
+    setattr(Estimate, name, lambda x: Estimate.of_variable(calculate(x), unit_of(x)))
+
+
+_function("__neg__", UFloat.__neg__, _unit_of)
+_function("__pos__", UFloat.__pos__, _unit_of)
+_function("sqrt", umath.sqrt, lambda x: _power(x, 0.5))
+_NAMES = "exp expm1 log log10 log1p sin cos tan sinh cosh tanh degrees radians arcsin arccos arctan"
+for _name in _NAMES.split():
+    _function(_name, getattr(umath, _name.replace("arc", "a")), lambda _: "")
+
+
 class UpperLimit(Estimate):
     """An estimate of a non-negative quantity that the record does not determine: its u exceeds its value.
 
@@ -98,12 +176,14 @@ class UpperLimit(Estimate):
     < 0.20 1/(m s) (95 %)
     """
 
+    __slots__ = ()
+
     @classmethod
     def of(cls, estimate: Estimate) -> Estimate:
         """Return the estimate unchanged if the record determines it, and as an upper limit otherwise."""
         if not estimate.u > abs(estimate.value):
             return estimate
-        return cls.of_variable(estimate.ufloat, estimate.unit, estimate.u)
+        return cls.of_variable(estimate, estimate.unit, estimate.u)
 
     @property
     def limit(self) -> float:
@@ -191,6 +271,4 @@ def _written(value: float, u: float, form: str, unit: str) -> str:
         return f"{value:.6g}{tail}"
     if not (abs(value) < 1e250 and 1e-250 < u < 1e250):
         return f"{value:g} +- {u:g}{tail}"
-    from uncertainties import ufloat
-
     return f"{ufloat(value, u):{form}}{tail}".replace("+/-", " +- ")

@@ -131,7 +131,7 @@ def _member(scene: Scene, joint: Joint, measured: Joint | None, values: list[flo
     if measured is not None and "spring_constant_n_per_m" in measured.names:
         constant = drawn["spring_constant_n_per_m"]
         share = effective_mass_kg(member) / effective_mass_kg(scene)
-        member = replace(member, spring_constant_n_per_m=replace(constant, value=constant.value * share))
+        member = replace(member, spring_constant_n_per_m=Estimate(constant.value * share, constant.u, constant.unit))
     return Problem.from_scene(member)
 
 

@@ -125,8 +125,7 @@ def _expected(run: Run, name: str, period: Estimate | None = None) -> list[Estim
     """
     if name not in run and name != "gamma":
         return []
-    value = run[name if name in run else "damping_rate"]
-    estimates = [Estimate(value.value, value.u, value.unit or "")]
+    estimates = [run[name if name in run else "damping_rate"]]
     omega, mass = run["angular_frequency"], run.scene.bob_mass_kg
     if name == "spring_constant" and mass is not None:
         k = omega.value**2 * mass.value

@@ -11,9 +11,8 @@ from pipeline.analyse import Analysis, Oscillation
 from pipeline.findings.finding import kinds
 from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.quantities import INPUTS, QUANTITIES
-from pipeline.units import Unit
+from pipeline.units import Unit, exponents_of
 from springmass.result.table1 import table_estimates, table_rows
-from springmass.result.values import exponents_of
 from springmass.typeset import typeset
 
 _WORDS = {"error": "Error", "warning": "Warning", "info": "Note"}

@@ -21,7 +21,6 @@ from springmass.loading.arrays import ABOUT, about_json
 from springmass.loading.loaded import Loaded
 from springmass.result.run_json import EXPANDED, picked
 from springmass.result.table1 import numbers_of, table_rows
-from springmass.result.values import Value
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,7 +31,7 @@ def estimates_frame(analysis: Analysis, *, correlations: bool = False) -> pd.Dat
     """Return one row per estimate; see :meth:`springmass.Run.to_dataframe`."""
     import pandas as pd
 
-    motion, values = analysis.motion, {name: Value.of(x) for name, x in numbers_of(analysis).items()}
+    motion, values = analysis.motion, numbers_of(analysis)
     derived = motion.derived if isinstance(motion, Oscillation) else None
     by_name = {row.name: row for row in table_rows([analysis])}
     rows: list[dict[str, Any]] = []
@@ -51,7 +50,7 @@ def estimates_frame(analysis: Analysis, *, correlations: bool = False) -> pd.Dat
     return frame
 
 
-def comparison_frame(compared: Comparison, periods: Mapping[str, Value]) -> pd.DataFrame:
+def comparison_frame(compared: Comparison, periods: Mapping[str, Estimate]) -> pd.DataFrame:
     """Return one row per run, by name, and one for their mean."""
     import pandas as pd
 
@@ -119,7 +118,7 @@ def run_dataset(loaded: Loaded, analysis: Analysis, name: str) -> xr.Dataset:
             "law_amplitude": (("law", "window"), np.array(curves), {"units": of_value}),
         }
         dataset.attrs["damping_law"] = damping.selected
-    for quantity, value in ((quantity, Value.of(x)) for quantity, x in numbers_of(analysis).items()):
+    for quantity, value in numbers_of(analysis).items():
         variables[quantity] = ((), value.value, {"u": value.u, "units": value.unit or "1"})
     return dataset.assign_coords(coordinates).assign(variables).assign_attrs(name=name)
 

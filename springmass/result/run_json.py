@@ -179,13 +179,14 @@ def picked(thing: object, names: Sequence[str]) -> dict[str, Any]:
 def plain(value: object) -> Any:
     """Return a value in a form that strict JSON can represent.
 
-    A dataclass becomes a mapping of its fields, and a number that is not finite becomes null. Fields that are ignored
-    in comparisons, such as the inputs of an estimate, are left out.
+    An estimate or a dataclass becomes a mapping of its fields, and a number that is not finite becomes null.
     """
+    if isinstance(value, Estimate):
+        return {name: plain(getattr(value, name)) for name in ("value", "u", "unit")}
     if isinstance(value, Mapping):
         return {str(key): plain(inner) for key, inner in value.items()}
     if is_dataclass(value) and not isinstance(value, type):
-        return {field.name: plain(getattr(value, field.name)) for field in fields(value) if field.compare}
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
     if hasattr(value, "tolist"):  # NumPy scalars and arrays
         return plain(value.tolist())
     if isinstance(value, list | tuple | set | frozenset):

@@ -14,6 +14,7 @@ from pipeline.analyse import Analysis, Oscillation, Relaxation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError
 from pipeline.findings.finding import Finding
+from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import Classic, classic
 from pipeline.track import Track
 from springmass.errors import LOG
@@ -27,7 +28,6 @@ from springmass.result.frames import estimates_frame, run_dataset, samples_datas
 from springmass.result.run_json import result_of, with_traps
 from springmass.result.summary import html_summary, text_summary
 from springmass.result.table1 import TableRow, numbers_of, table_rows
-from springmass.result.values import Value
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Run(Mapping[str, Value]):
+class Run(Mapping[str, Estimate]):
     """A recording with its analysis, as :func:`springmass.load` and :func:`springmass.analyse` return it.
 
     It is a mapping of names and symbols to values: ``run["period"]``, ``run["T"]``, ``run["k"]``, and the coefficients
@@ -154,19 +154,19 @@ class Run(Mapping[str, Value]):
         """The lines of Table 1."""
         return table_rows([self.analysis])
 
-    def __getitem__(self, name: str) -> Value:
+    def __getitem__(self, name: str) -> Estimate:
         everything, motion = numbers_of(self.analysis), self.analysis.motion
         if name in everything:
-            return Value.of(everything[name])
+            return everything[name]
         for row in self.rows:
             (estimate,) = row.estimates
             if estimate is not None and name in (row.symbol, row.on_screen):
-                return Value.of(estimate)
+                return estimate
         law, _, parameter = name.partition(".")
         if isinstance(motion, Oscillation) and law in motion.damping.fits:
             parameters = motion.derived.parameters_of(motion.damping.fits[law])
             if parameter in parameters:
-                return Value.of(parameters[parameter])
+                return parameters[parameter]
         if name in ("spring_constant", "k") and self.scene.bob_mass_kg is None and "period" in everything:
             raise _NoValue(f"{name} needs the mass of the bob: pass scene=Scene(bob_mass_kg=(KG, U_KG))")
         errors = [finding.message for finding in self.findings if finding.severity == "error"]

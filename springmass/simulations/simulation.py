@@ -69,7 +69,7 @@ def prepare(scene: Scene, seconds: float, *, analysis: Analysis | None = None, w
     solved, problem, drag = scene, Problem.from_scene(scene, where=where), None
     if derived:
         drag = derive_drag(scene, problem.amplitude_m(), seconds)
-        gamma, beta = drag.joint["gamma_per_s"], replace(drag.joint["beta_per_m_s"], unit="1/(m s)")
+        gamma, beta = drag.joint["gamma_per_s"], Estimate.of_variable(drag.joint["beta_per_m_s"], "1/(m s)")
         solved = replace(scene, gamma_per_s=gamma, beta_per_m_s=beta)
         measured = _together(measured, drag.joint)
         problem = Problem.from_scene(solved, where=where)
