@@ -13,7 +13,7 @@ from acquisition.errors import visible
 from pipeline.analyse import Oscillation
 from pipeline.findings.finding import kinds
 from pipeline.numerics.estimate import Estimate
-from pipeline.registry.quantities import EFFECTS, INPUTS
+from pipeline.quantities import EFFECTS, INPUTS
 from pipeline.track import Track
 from springmass.charts.browser import chart_style, report_source
 from springmass.charts.chart import Chart, to_json

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from pipeline.analyse import Analysis, Oscillation, Still
 from pipeline.damping.laws import words_of
-from pipeline.numerics.quantity import noun
-from pipeline.registry.quantities import INPUTS
+from pipeline.quantities import INPUTS
 from pipeline.results.budget import Contribution
 from pipeline.track import UNUSABLE
+from pipeline.units import noun
 from springmass.result.advice import harm_of, sentence
 from springmass.result.budget_tables import budgets_of
 from springmass.result.grades import grades_of, grades_text, leaves_more_than_noise

@@ -2,7 +2,7 @@
 
 A number is sound only if no finding contradicts the model that it comes from. A finding names the parts of the model
 that it doubts (``doubts`` in findings.toml), and a quantity those that it comes from (``parts`` of its
-:class:`pipeline.registry.quantities.Quantity`).
+:class:`pipeline.quantities.Quantity`).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any, Literal, get_args
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.findings.finding import Finding, kinds
 from pipeline.numerics.estimate import Estimate, UpperLimit
-from pipeline.registry.quantities import INPUTS, MODEL_PARTS, QUANTITIES
+from pipeline.quantities import INPUTS, MODEL_PARTS, QUANTITIES
 from springmass.result.table1 import is_about, numbers_of, table_rows
 
 Grade = Literal["sound", "uncertain", "do not quote"]

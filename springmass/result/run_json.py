@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 from acquisition.recordings.recording import FormatIssue
 from pipeline.analyse import Oscillation
 from pipeline.findings.finding import UNKNOWN_CODE, Finding, by_severity, kinds, word
+from pipeline.notice import Notice
 from pipeline.numerics.estimate import Estimate, UpperLimit
-from pipeline.registry.found import Found
 from pipeline.results.budget import Contribution
 from springmass import __version__
 from springmass.loading.loaded import Loaded
@@ -117,9 +117,9 @@ def with_traps(findings: Sequence[Finding], traps: Sequence[FormatIssue]) -> tup
 
 def _of_reader(trap: FormatIssue) -> Finding:
     if trap.code in kinds():
-        return word(Found(trap.code, {"sentence": _sentence(trap.message)}))
+        return word(Notice(trap.code, {"sentence": _sentence(trap.message)}))
     # A run file may come from a version that knows more codes than this one.
-    return word(Found(UNKNOWN_CODE, {"sentence": f"{trap.code}: {trap.message}"}))
+    return word(Notice(UNKNOWN_CODE, {"sentence": f"{trap.code}: {trap.message}"}))
 
 
 def _sentence(clause: str) -> str:

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.dynamics import Equation, Problem, get_integrator
-from pipeline.dynamics.halving import auto, halved, solved_once
 from pipeline.errors import DynamicsError
+from pipeline.simulation import Equation, Problem, get_integrator
+from pipeline.simulation.halving import auto, halved, solved_once
 from tests.conformance.test_integrators import STEP, STORED, problem_of
 from tests.sampling import sampled
 

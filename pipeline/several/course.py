@@ -13,7 +13,7 @@ from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.levels import FEWEST_FOR_MEDIAN, NEGLIGIBLE, OUTLIER, coverage_factor
 from pipeline.numerics.robust import mad_sigma
-from pipeline.results.compare import Comparison, SpringRun, compare_springs
+from pipeline.several.compare import Comparison, SpringRun, compare_springs
 
 FEW = FEWEST_FOR_MEDIAN + 1  # minimum number of runs in a group: the others without one run have a median
 # Maximum number of runs compared as those of one bench, which takes 0.3 s as measured if they disagree; of a larger
@@ -129,7 +129,18 @@ def agreement(quantity: str, group: str, values: Sequence[Estimate], benches: Se
         apart = math.sqrt(float(weights @ (means - middle) ** 2) / dof / weights.sum())
         u = max(u, coverage_factor(dof) / coverage_factor(math.inf) * apart)
     mean = Estimate(middle, u, values[0].unit)
-    return Agreement(quantity, group, mean, within, between, stated, x.size, len(parts), chi2, dof)
+    return Agreement(
+        quantity=quantity,
+        group=group,
+        mean=mean,
+        within=within,
+        between=between,
+        stated=stated,
+        runs=x.size,
+        benches=len(parts),
+        chi2=chi2,
+        dof=dof,
+    )
 
 
 def judged(runs: Sequence[CourseRun]) -> tuple[tuple[Suspect, ...], tuple[Disagreement, ...]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from pipeline.numerics.quantity import Unit
+from pipeline.units import Unit
 
 # What a value may come from: the times and the distances (or other values) of the record, the scene, one frequency, and
 # a law of damping.

@@ -11,10 +11,10 @@ import numpy as np
 from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_CURVE, FEWEST_FOR_MEDIAN, IMPROBABLE, NEGLIGIBLE, ROUNDS
 from pipeline.numerics.regression import chi2_quantile
 from pipeline.numerics.robust import median
-from pipeline.samples.condition import Conditioned
+from pipeline.samples.condition import Samples
 from pipeline.track import F8
 from pipeline.windows.cycles import NoOscillation, find_cycles
-from pipeline.windows.demodulate import Demodulated, demodulate
+from pipeline.windows.demodulate import Windows, demodulate
 
 # Maximum deviation of times that are row numbers from equal steps, in steps: that of times printed to 10 us at 100 Hz.
 # Times measured by a host jitter by ten times as much.
@@ -27,10 +27,10 @@ class LostRows:
 
     share: float  # share of the samples that are missing
     places: int  # number of places where some are missing
-    samples: Conditioned  # the record with times that count the lost samples
+    samples: Samples  # the record with times that count the lost samples
 
 
-def find_lost_rows(samples: Conditioned, windows: Demodulated) -> LostRows | None:
+def find_lost_rows(samples: Samples, windows: Windows) -> LostRows | None:
     """Return what shows that samples were lost; None if nothing does.
 
     A lost sample advances the phase by :math:`\\omega h` at once. Sinusoids of known frequency are fitted to at most
@@ -68,7 +68,7 @@ def find_lost_rows(samples: Conditioned, windows: Demodulated) -> LostRows | Non
     return found
 
 
-def _even_step(samples: Conditioned) -> float | None:
+def _even_step(samples: Samples) -> float | None:
     """Return the step between times that are row numbers, s; None if they are not, or if many samples are left out."""
     t = samples.track.t
     if t.size < 2 or np.mean(samples.used) < 1.0 - NEGLIGIBLE:
@@ -106,7 +106,7 @@ def _lost(y: F8, turn: float, length: int) -> F8 | None:
     return lost if genuine else None
 
 
-def _scatter(windows: Demodulated) -> float:
+def _scatter(windows: Windows) -> float:
     """Return the mean squared deviation of the windows' phases from a parabola, rad^2."""
     fitted = np.polynomial.Polynomial.fit(windows.t, windows.phase, 2)
     return float(np.mean((windows.phase - fitted(windows.t)) ** 2))

@@ -8,14 +8,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.numerics.levels import OUTLIER
 from pipeline.numerics.robust import mad_sigma
-from pipeline.track import F8
-from pipeline.windows.demodulate import Demodulated
-
-C16 = NDArray[np.complex128]
+from pipeline.samples.condition import Samples
+from pipeline.track import C16, F8
+from pipeline.windows.demodulate import Windows
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,22 +32,22 @@ class Carrier:
     rest_degree: int
 
     @classmethod
-    def through(cls, demodulated: Demodulated, start: float, end: float) -> Carrier:
+    def through(cls, windows: Windows, start: float, end: float) -> Carrier:
         """Fit polynomials to the windows' amplitudes, phases and rest positions."""
-        t, omega = demodulated.t, demodulated.angular_frequency
+        t, omega = windows.t, windows.angular_frequency
         degree, rest_degree = min(8, max(1, t.size // 6)), min(6, max(1, t.size // 10))
-        turning = demodulated.phase - omega * (t - start)
+        turning = windows.phase - omega * (t - start)
         nodes = np.concatenate([[start], t, [end]])
         centre, half = 0.5 * (t[0] + t[-1]), 0.5 * (t[-1] - t[0])
         powers = np.polynomial.legendre.legvander((nodes - centre) / half, max(degree, rest_degree))
         return cls(
-            nodes,
-            _smooth(powers[:, : degree + 1], demodulated.amplitude),
-            _smooth(powers[:, : degree + 1], turning),
-            _smooth(powers[:, : rest_degree + 1], demodulated.offset),
-            omega,
-            degree,
-            rest_degree,
+            t=nodes,
+            amplitude=_smooth(powers[:, : degree + 1], windows.amplitude),
+            turning=_smooth(powers[:, : degree + 1], turning),
+            rest=_smooth(powers[:, : rest_degree + 1], windows.offset),
+            angular_frequency=omega,
+            degree=degree,
+            rest_degree=rest_degree,
         )
 
     def phase(self, t: F8) -> F8:
@@ -103,7 +101,7 @@ class Mode:
     span: tuple[float, float]
     coefficients: C16  # (degree + 1,) m, coefficients of the envelope, in Legendre polynomials over ``span``
     decay: float = 0.0  # logarithmic decay rate of an independent mode's wave, 1/s
-    amplitude_m: float = 0.0  # root mean square of :math:`|E w|` over the record
+    amplitude: float = 0.0  # root mean square of :math:`|E w|` over the record
 
     @property
     def kind(self) -> Literal["mode", "harmonic"]:
@@ -133,14 +131,16 @@ class Mode:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sideways:
-    """All modes found, the strongest independent mode first."""
+class Modes:
+    """All modes found, the strongest independent mode first, and whether they were subtracted from the samples."""
 
-    modes: tuple[Mode, ...]
-    carrier: Carrier | None  # main oscillation; None if the record is too short, or too long, for a search
-
-    def __bool__(self) -> bool:
-        return bool(self.modes)
+    samples: Samples  # on which later stages work: without the modes, if these were subtracted
+    members: tuple[Mode, ...] = ()
+    carrier: Carrier | None = None  # main oscillation; None if the record is too short, or too long, for a search
+    # (n,) sum of the modes at the record's times. None if it is not subtracted, because it would bias the amplitude by
+    # less than a tenth of its uncertainty.
+    subtracted: F8 | None = None
+    leak: float = 0.0  # bias of the amplitude that the modes would cause
 
     def columns(self, t: F8) -> F8:
         """Return the basis (n, k) of all modes at times t (n,) for a fit that is linear in them."""
@@ -155,8 +155,8 @@ class Sideways:
         return total
 
     def _waves(self, t: F8) -> Iterator[tuple[Mode, C16]]:
-        if self.carrier is None or not self.modes:
+        if self.carrier is None or not self.members:
             return
         main = self.carrier.wave(t)
-        for mode in self.modes:
+        for mode in self.members:
             yield mode, mode.wave(t, main)

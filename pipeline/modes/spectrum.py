@@ -26,7 +26,7 @@ OVERSAMPLING = 4
 # Independent trials per natural bin, because frequencies between bins are searched too; measured by the rate of false
 # alarms (tests/trials/test_disturbances.py).
 CONTINUUM = 2.5
-NEAR, FAR = 2, 7  # distances from a line, in natural bins, between which the noise power is measured
+NEAREST, FARTHEST = 2, 7  # distances from a line, in natural bins, between which the noise power is measured
 VARYING = 3  # degree of the polynomials for a line's amplitude and phase while the noise beside it is measured
 FREEDOM = 6.0  # complex degrees of freedom of the noise power: twelve bins, halved by the taper
 
@@ -64,7 +64,9 @@ class Blocks:
         weight = np.sqrt(count)
         tapered = np.hanning(size + 2)[1:-1] * weight
         taper = tapered * weight / math.sqrt(samples * float(tapered @ tapered))
-        return cls(middle + away, mean, weight, step, float(samples), origin, taper)
+        return cls(
+            t=middle + away, y=mean, weight=weight, step=step, samples=float(samples), origin=origin, taper=taper
+        )
 
     @property
     def seconds(self) -> float:
@@ -78,7 +80,7 @@ class Blocks:
 
 
 @dataclass(frozen=True, slots=True)
-class Band:
+class SearchBand:
     """The frequencies at which a line is searched."""
 
     low_hz: float
@@ -111,7 +113,7 @@ def spectrum(blocks: Blocks, y: F8) -> tuple[F8, F8]:
     return frequency, np.asarray(lines.real**2 + lines.imag**2, np.float64)
 
 
-def worth_a_look(blocks: Blocks, band: Band, fixed_hz: tuple[float, ...], chance: float) -> bool:
+def worth_a_look(blocks: Blocks, band: SearchBand, fixed_hz: tuple[float, ...], chance: float) -> bool:
     """Return whether any line could be significant; this quick test spares most records the full search.
 
     A record passes with half the evidence needed for acceptance, relative to the median density of the band.
@@ -132,7 +134,7 @@ def _trials(inside: NDArray[np.bool_], spacing_hz: float, blocks: Blocks) -> flo
     return max(CONTINUUM * float(np.count_nonzero(inside)) * spacing_hz * blocks.seconds, 1.0)
 
 
-def strongest(blocks: Blocks, left: F8, basis: F8, band: Band) -> Peak | None:
+def strongest(blocks: Blocks, left: F8, basis: F8, band: SearchBand) -> Peak | None:
     """Find the strongest line, and the probability that pure noise produces one as strong.
 
     None where the band is empty.
@@ -192,12 +194,12 @@ def evidence_for(chance: float, trials: float) -> float:
     return float(FREEDOM * math.expm1(-math.log(single) / FREEDOM))
 
 
-def spectral_density(blocks: Blocks, y: F8, frequency_hz: float, band: Band, smooth: float) -> float:
+def spectral_density(blocks: Blocks, y: F8, frequency_hz: float, band: SearchBand, smooth: float) -> float:
     """Return the noise variance of one block at a frequency, m^2: the larger of the smooth and the local one."""
     frequency, power = spectrum(blocks, y)
-    reach = FAR / blocks.seconds
+    reach = FARTHEST / blocks.seconds
     around = slice(*np.searchsorted(frequency, [frequency_hz - reach, frequency_hz + reach]))
-    near = band.inside(frequency[around]) & (np.abs(frequency[around] - frequency_hz) * blocks.seconds >= NEAR)
+    near = band.inside(frequency[around]) & (np.abs(frequency[around] - frequency_hz) * blocks.seconds >= NEAREST)
     local = float(np.mean(power[around][near])) if np.count_nonzero(near) >= 4 * OVERSAMPLING else 0.0
     return max(smooth, local, 1e-300)
 

@@ -167,18 +167,18 @@ def _fit(
     i, j = np.triu_indices(len(runs), 1)
     deviations = np.abs(each[i] - each[j]) / np.sqrt(variances[i] + variances[j] - 2.0 * whole[i, j])
     return Comparison(
-        tuple(run.name for run in runs),
-        constant,
-        found,
-        stated is not None,
-        solved,
-        tuple(Estimate(float(value), math.sqrt(v), "N/m") for value, v in zip(each, variances, strict=True)),
-        tuple(map(float, own)),
-        tuple(map(float, line.residual / line.u_residual)),
-        chi2,
-        dof,
-        tension,
-        float(deviations.max()),
+        names=tuple(run.name for run in runs),
+        spring_constant=constant,
+        spring_mass=found,
+        spring_mass_stated=stated is not None,
+        solved=solved,
+        each=tuple(Estimate(float(value), math.sqrt(v), "N/m") for value, v in zip(each, variances, strict=True)),
+        own_u=tuple(map(float, own)),
+        pulls=tuple(map(float, line.residual / line.u_residual)),
+        chi2=chi2,
+        dof=dof,
+        tension=tension,
+        largest_deviation=float(deviations.max()),
     )
 
 

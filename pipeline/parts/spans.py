@@ -1,4 +1,4 @@
-"""Segments: the part of a record with one free oscillation, and the handling before, between and after.
+"""Partition: the part of a record with one free oscillation, and the handling before, between and after.
 
 The amplitude of a free oscillation decays smoothly and its phase advances steadily. This does not hold for a bob that
 hangs still, is lifted, held or caught. At a restart, a touch, lost rows or a stopped clock, amplitude or phase jumps
@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 
 from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_CURVE, FEWEST_FOR_LINE, NEGLIGIBLE, normal_quantile
 from pipeline.numerics.robust import median
-from pipeline.samples.condition import Conditioned
+from pipeline.parts.change_points import find_changes, lone_points
+from pipeline.samples.condition import Samples
 from pipeline.track import F8, Quality, Track
-from pipeline.windows.change_points import find_changes, lone_points
-from pipeline.windows.demodulate import FINEST, Demodulated
+from pipeline.windows.demodulate import FINEST, Windows
 
 LARGEST_EXPONENT = math.log(math.sqrt(sys.float_info.max))
-NEAR = FEWEST_FOR_LINE  # number of windows beside a break or still windows from which the motion is extrapolated
+ADJACENT = FEWEST_FOR_LINE  # number of windows beside a break or still windows from which the motion is extrapolated
 # Minimum amplitude of a part relative to the largest one; a smaller motion is a remnant of handling. With 0.1, the 167
 # samples in a hand are analysed too, as measured by `python -m tests.golden --only torsione`.
 SHARE = 0.2
@@ -76,7 +76,7 @@ class Break:
 
 
 @dataclass(frozen=True, slots=True)
-class Segments:
+class Partition:
     """The part of a record that is analysed, and the parts that are left out."""
 
     # first_s, last_s: start and end of the analysed part, s.
@@ -90,38 +90,38 @@ class Segments:
         outside = ~((track.t >= self.first_s) & (track.t <= self.last_s))
         return replace(track, flags=track.flags | np.where(outside, np.uint8(Quality.OUTSIDE), np.uint8(0)))
 
-    def within(self, before: Segments | None) -> Segments:
-        """Combine these segments with earlier ones, within whose part they were found."""
+    def within(self, before: Partition | None) -> Partition:
+        """Combine this partition with an earlier one, within whose part they were found."""
         if before is None:
             return self
         spans = sorted((*before.left_out, *self.left_out), key=lambda span: span.first_s)
         breaks = sorted((*before.breaks, *self.breaks), key=lambda each: each.time_s)
         first_s, last_s = max(self.first_s, before.first_s), min(self.last_s, before.last_s)
-        return Segments(first_s, last_s, tuple(spans), tuple(breaks))
+        return Partition(first_s, last_s, tuple(spans), tuple(breaks))
 
 
-def before_trigger(conditioned: Conditioned) -> Segments | None:
+def before_trigger(samples: Samples) -> Partition | None:
     """Return the part after the trigger, if the bob hung still before it; None otherwise."""
-    t, y, moment_s = conditioned.track.t, conditioned.track.y, conditioned.track.trigger_s
+    t, y, moment_s = samples.track.t, samples.track.y, samples.track.trigger_s
     if moment_s is None:
         return None
-    before, after = conditioned.used & (t < moment_s), conditioned.used & (t >= moment_s)
+    before, after = samples.used & (t < moment_s), samples.used & (t >= moment_s)
     if not before.any() or np.count_nonzero(after) < FEWEST_FOR_CURVE:
         return None
     # A bob that is already swinging triggers immediately, so there is no still part to leave out.
     still, swing = (float(np.ptp(np.quantile(y[rows], (0.05, 0.95)))) for rows in (before, after))
-    if still > NEGLIGIBLE * swing + 2.0 * normal_quantile(0.9) * conditioned.noise_m:
+    if still > NEGLIGIBLE * swing + 2.0 * normal_quantile(0.9) * samples.noise:
         return None
-    return Segments(moment_s, math.inf, (Span(SpanKind.WAITING, float(t[before][0]), moment_s),))
+    return Partition(moment_s, math.inf, (Span(SpanKind.WAITING, float(t[before][0]), moment_s),))
 
 
-def find_free_part(conditioned: Conditioned, windows: Demodulated) -> Segments | None:
+def free_span(samples: Samples, windows: Windows) -> Partition | None:
     """Return the longest part with one free oscillation; None if this is the whole record.
 
     The maximum amplitude of n windows without any motion exceeds :math:`r u = \\sqrt{2 \\ln(n/\\alpha)}\\,u` with
     probability :math:`\\alpha` (Rayleigh distribution). Windows below this are still if a straight line through their
     neighbours' amplitudes extrapolates to more than twice this value. Between still windows the record is split where
-    amplitude or phase jumps, see :func:`pipeline.windows.change_points.find_changes`. The record's median decay and
+    amplitude or phase jumps, see :func:`pipeline.parts.change_points.find_changes`. The record's median decay and
     frequency are removed first, so that a cubic can follow the remainder. The moment of a touch within its window is
     unknown, so a window on either side of a jump is left out.
     """
@@ -133,11 +133,11 @@ def find_free_part(conditioned: Conditioned, windows: Demodulated) -> Segments |
         return _faded(series, moving)
     if series.fall > MOST_FALL:
         return _released(series)
-    return _chosen(series, series.parts(), conditioned)
+    return _chosen(series, series.parts(), samples)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Part:
+class _WindowSpan:
     """Windows first to stop - 1: all still, or moving without a jump."""
 
     first: int
@@ -162,7 +162,7 @@ class _Series:
     weak: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, windows: Demodulated) -> _Series:
+    def of(cls, windows: Windows) -> _Series:
         t, size = windows.t, np.abs(windows.amplitude)
         least = 1e-12 * float(size.max()) + 1e-150
         u = np.maximum(np.sqrt(windows.covariance[:, 0, 0]), np.maximum(FINEST * size, least))
@@ -188,7 +188,7 @@ class _Series:
     def fall(self) -> float:
         """Median decrease of the logarithm of the amplitude per window, after the maximum."""
         first = int(np.argmax(self.size))
-        steps = -np.diff(np.log(np.maximum(self.size[first : first + NEAR + 3], self.u[0, first])))
+        steps = -np.diff(np.log(np.maximum(self.size[first : first + ADJACENT + 3], self.u[0, first])))
         return median(steps) if steps.size else 0.0
 
     def moving(self) -> int:
@@ -196,21 +196,24 @@ class _Series:
         pairs = np.flatnonzero(~self.weak[1:] & ~self.weak[:-1])
         return int(pairs[-1]) + 2 if pairs.size else 0
 
-    def parts(self) -> list[_Part]:
+    def parts(self) -> list[_WindowSpan]:
         """Split the record into runs of still windows and the parts between jumps."""
         edges = np.flatnonzero(np.diff(np.concatenate([[False], self.weak, [False]])))
         parts, begin = [], 0
         for first, stop in edges.reshape(-1, 2).tolist():
             if self.stands_still(first, stop):
-                parts += [*self.between_jumps(begin, first), _Part(first, stop, True)]
+                parts += [*self.between_jumps(begin, first), _WindowSpan(first, stop, True)]
                 begin = stop
         return [*parts, *self.between_jumps(begin, self.t.size)]
 
     def stands_still(self, first: int, stop: int) -> bool:
         """Return whether moving windows beside weak ones extrapolate to over twice the limit of noise there."""
-        before, after = np.flatnonzero(~self.weak[:first])[-NEAR:], stop + np.flatnonzero(~self.weak[stop:])[:NEAR]
+        before, after = (
+            np.flatnonzero(~self.weak[:first])[-ADJACENT:],
+            stop + np.flatnonzero(~self.weak[stop:])[:ADJACENT],
+        )
         return any(
-            rows.size >= NEAR and self.continued(rows, k)[0] > 2.0 * self.far * self.u[0, k]
+            rows.size >= ADJACENT and self.continued(rows, k)[0] > 2.0 * self.far * self.u[0, k]
             for rows, k in ((before, first), (after, stop - 1))
         )
 
@@ -220,34 +223,34 @@ class _Series:
         slope = np.median(np.diff(self.values[:, rows]) / np.diff(t), axis=1)
         return np.asarray(np.median(self.values[:, rows] - slope[:, None] * t, axis=1))
 
-    def between_jumps(self, first: int, stop: int) -> list[_Part]:
+    def between_jumps(self, first: int, stop: int) -> list[_WindowSpan]:
         """Split windows first to stop - 1 at their jumps."""
-        if stop - first < NEAR:
-            return [_Part(first, stop, False)] if stop > first else []
+        if stop - first < ADJACENT:
+            return [_WindowSpan(first, stop, False)] if stop > first else []
         values, u = self.values[:, first:stop], self.u[:, first:stop]
         rows = np.flatnonzero(~lone_points(values, u, FALSE_ALARM))
         changes = find_changes(self.t[first + rows], values[:, rows], u[:, rows])
         edges = [first, *(first + int(rows[k]) for k in changes), stop]
-        return [_Part(a, b, False) for a, b in itertools.pairwise(edges)]
+        return [_WindowSpan(a, b, False) for a, b in itertools.pairwise(edges)]
 
 
-def _chosen(series: _Series, parts: list[_Part], conditioned: Conditioned) -> Segments | None:
+def _chosen(series: _Series, parts: list[_WindowSpan], samples: Samples) -> Partition | None:
     """Return the longest of the parts that oscillate freely, with the spans and breaks beside it."""
     if len(parts) == 1:
         return None
     n = series.t.size
-    # A window beside a cut may contain part of the disturbance there.
+    # A window beside a jump may contain part of the disturbance there.
     limits = [(part.first + (part.first > 0), part.stop - (part.stop < n)) for part in parts]
     # In a long decay the amplitude is small for most of the time, so its beginning counts too.
     sizes = [series.size[part.first : part.stop] for part in parts]
-    size = np.array([max(median(each), median(each[:NEAR])) for each in sizes])
+    size = np.array([max(median(each), median(each[:ADJACENT])) for each in sizes])
     length = np.array([stop - first for first, stop in limits])
     free = ~np.array([part.still for part in parts]) & (length >= FEWEST_FOR_LINE)
     if not free.any():
         return None
     free &= size > SHARE * size[free].max()
     chosen = int(np.argmax(np.where(free, length, 0)))
-    t = conditioned.track.t[conditioned.used]
+    t = samples.track.t[samples.used]
     begin_s, end_s, half = float(t[0]), float(t[-1]), 0.5 * series.spacing
 
     def seconds(first: int, stop: int) -> tuple[float, float]:
@@ -268,14 +271,14 @@ def _chosen(series: _Series, parts: list[_Part], conditioned: Conditioned) -> Se
     if end_s - before > half:
         spans.append(Span(SpanKind.HANDLED, before, end_s))
     breaks = [_break(series, a[1], b[0]) for a, b in itertools.pairwise(itertools.compress(limits, free))]
-    return Segments(*seconds(*limits[chosen]), tuple(spans), tuple(breaks))
+    return Partition(*seconds(*limits[chosen]), tuple(spans), tuple(breaks))
 
 
 def _break(series: _Series, stop: int, start: int) -> Break:
     """Describe the break between the last window of one free oscillation and the first of the next."""
     middle = 0.5 * (stop - 1 + start)
-    before = series.continued(np.arange(stop - NEAR, stop), middle)
-    after = series.continued(np.arange(start, start + NEAR), middle)
+    before = series.continued(np.arange(stop - ADJACENT, stop), middle)
+    after = series.continued(np.arange(start, start + ADJACENT), middle)
     ratio = math.log(max(after[0], series.u[0, start]) / max(before[0], series.u[0, stop - 1]))
     angle = math.remainder(after[1] - before[1], 2.0 * math.pi)
     first_s, last_s = float(series.t[stop - 1]), float(series.t[start])
@@ -284,14 +287,14 @@ def _break(series: _Series, stop: int, start: int) -> Break:
     u_ratio = math.sqrt(0.2 + 0.1 * away**2) * math.hypot(series.u[1, stop - 1], series.u[1, start])
     # Of touches at any moment, one in sixteen changes the phase ten times as much as the amplitude.
     alone = abs(ratio) < min(max(series.far * u_ratio, NEGLIGIBLE * abs(angle)), abs(angle))
-    if start - stop >= NEAR:
+    if start - stop >= ADJACENT:
         kind = BreakKind.RESTARTED
     else:
         kind = BreakKind.PHASE_JUMP if alone else BreakKind.TOUCHED
     return Break(kind, 0.5 * (first_s + last_s), math.expm1(ratio), angle)
 
 
-def _released(series: _Series) -> Segments | None:
+def _released(series: _Series) -> Partition | None:
     """Return the record from the release on, before which the amplitude was far smaller; a free one only falls."""
     most = int(np.argmax(series.size))
     small = np.flatnonzero(series.size[:most] < SHARE * series.size[most])
@@ -301,13 +304,13 @@ def _released(series: _Series) -> Segments | None:
     first = int(small[-1]) + 2
     begin_s, first_s = float(series.t[0]) - 0.5 * series.spacing, float(series.t[first]) - 0.5 * series.spacing
     kind = SpanKind.AT_REST if np.max(series.size[small]) < NEGLIGIBLE * series.size[most] else SpanKind.HANDLED
-    return Segments(first_s, math.inf, (Span(kind, begin_s, first_s),))
+    return Partition(first_s, math.inf, (Span(kind, begin_s, first_s),))
 
 
-def _faded(series: _Series, moving: int) -> Segments | None:
+def _faded(series: _Series, moving: int) -> Partition | None:
     """Return the record up to where its motion is lost in the noise permanently."""
     if moving < 2:
         return None
     last_s = float(series.t[moving - 1]) + series.spacing
     end_s = float(series.t[-1]) + 0.5 * series.spacing
-    return Segments(-math.inf, last_s, (Span(SpanKind.AT_REST, last_s, end_s),))
+    return Partition(-math.inf, last_s, (Span(SpanKind.AT_REST, last_s, end_s),))

@@ -13,22 +13,19 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.bench.scene import Scene
 from pipeline.damping.laws.drag import amplitudes
 from pipeline.dynamics.equation import Problem, effective_mass_kg
 from pipeline.errors import DynamicsError
 from pipeline.numerics.estimate import Estimate, Joint
-from pipeline.track import F8
-
-C16 = NDArray[np.complex128]
+from pipeline.track import C16, F8
 
 LEVELS = ("low_95", "low_68", "high_68", "high_95")
 SHARES = (0.025, 0.158655, 0.841345, 0.975)  # probabilities below each level
 MEMBERS = 2000  # default ensemble size; by chance, the share inside the 95 % band then scatters by half a percent
 RADIANS = 0.4  # from one state to the next; between them the band is off by half a percent of its width, as measured
-MOST_STEPS = 25_000  # maximum number of states of a band
+MOST_STATES = 25_000  # maximum number of states of a band
 STRETCH = 1000  # number of states in memory at a time
 STRONGEST = 0.9  # maximum ratio of decay rate and angular frequency at which a motion is an oscillation
 SIGNED = ("start_displacement_m", "start_velocity_m_per_s", "spring_cubic_n_per_m3", "air_temperature_c")
@@ -148,12 +145,24 @@ def spread(
     ensemble += [_member(scene, joint, measured, values) for values in (joint.values + shifts).tolist()]
     step_s = RADIANS / ensemble[0].equation.angular_frequency_per_s
     steps = max(1, math.ceil(seconds / step_s))
-    if steps > MOST_STEPS:
-        raise DynamicsError(f"a band of {seconds:g} s is too long", f"ask for at most {MOST_STEPS * step_s:.3g} s")
+    if steps > MOST_STATES:
+        raise DynamicsError(f"a band of {seconds:g} s is too long", f"ask for at most {MOST_STATES * step_s:.3g} s")
     t = step_s * np.arange(steps + 1.0)
     parts = [_quantiles(*stretch, members) for stretch in _motions(ensemble, t)]
-    middle, of_log, *levels = (np.concatenate(each, axis=-1) for each in zip(*parts, strict=True))
-    return Band(joint.names, members, seed, t, middle, of_log, *levels)
+    middle, of_log, displacement, amplitude, phase = (
+        np.concatenate(each, axis=-1) for each in zip(*parts, strict=True)
+    )
+    return Band(
+        quantities=joint.names,
+        members=members,
+        seed=seed,
+        t=t,
+        middle=middle,
+        of_log=of_log,
+        of_displacement=displacement,
+        of_amplitude=amplitude,
+        of_phase=phase,
+    )
 
 
 def _quantiles(y: F8, amplitude: F8, phase: F8, members: int) -> tuple[Any, ...]:

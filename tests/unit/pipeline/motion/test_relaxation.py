@@ -1,4 +1,4 @@
-"""Overdamped motions give their rates; what only looks like one is not taken for one."""
+"""Relaxation motions give their rates; what only looks like one is not taken for one."""
 
 from __future__ import annotations
 

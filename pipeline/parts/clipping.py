@@ -11,25 +11,23 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_MEDIAN, OUTLIER, ROUNDS, normal_quantile
 from pipeline.numerics.robust import mad_sigma
-from pipeline.samples.condition import Conditioned, Cut
-from pipeline.track import F8, Quality
+from pipeline.samples.condition import Clipping, Samples
+from pipeline.track import F8, Bools, Quality
 from pipeline.windows.cycles import Cycles
-from pipeline.windows.demodulate import ROUNDING, Demodulated
-from pipeline.windows.sinusoids import Windows, refit, solve
+from pipeline.windows.demodulate import ROUNDING, Windows
+from pipeline.windows.sinusoids import WindowSamples, refit, solve
 
 # Number of heights tried for the level, from the middle of the swing to its top. With 80, amplitudes of clipped records
 # move by up to 0.05 u, as measured by `python -m tests.trials.troubles --only clipped`.
-LEVELS = 40
+HEIGHTS = 40
 # Share of a plateau's samples below the level beyond which samples are left out. With 0.1, amplitudes of clipped
 # records of `python -m tests.golden` move by up to 0.1 u.
 SHARE_BEYOND = 0.05
 
-Bools = NDArray[np.bool_]
-# Fraction of the amplitude within which the motion is never cut, so that the sinusoid can be fitted: a sample lies
+# Fraction of the amplitude within which the motion is never clipped, so that the sinusoid can be fitted: a sample lies
 # there with a probability of 1/3.
 MIDDLE = 0.5
 # Fraction of the amplitude beyond which the crest lies: within 30 degrees of the turning point.
@@ -58,20 +56,20 @@ class _Fit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _End:
-    """One end at which the crests of the first windows are cut beyond a level: distance times the end's sign, m."""
+    """One end at which the crests of the first windows are clipped beyond a level: distance times the end's sign, m."""
 
     sign: float
     level: float
     windows: int
 
 
-def find_cuts(conditioned: Conditioned, cycles: Cycles, demodulated: Demodulated) -> Conditioned | None:
-    """Return the record with every cut crest flagged, or None if no cuts show beyond those flagged already.
+def find_clipping(samples: Samples, cycles: Cycles, windows: Windows) -> Samples | None:
+    """Return the record with every clipped crest flagged, or None if none shows beyond those flagged already.
 
     Every window's sinusoid is fitted to the middle of its swing. Let :math:`z_j` be the shortfall of the median of
-    crest j in standard uncertainties. Crests 1 to n are cut if n maximises :math:`\\sum_{j \\le n} z_j/\\sqrt n` and
-    this exceeds what noise reaches at any n with probability :data:`FALSE_ALARM` (Bonferroni's bound). The first crests
-    are taken because a bob with decaying amplitude reaches a fixed object at first and later no longer.
+    crest j in standard uncertainties. Crests 1 to n are clipped if n maximises :math:`\\sum_{j \\le n} z_j/\\sqrt n`
+    and this exceeds what noise reaches at any n with probability :data:`FALSE_ALARM` (Bonferroni's bound). The first
+    crests are taken because a bob with decaying amplitude reaches a fixed object at first and later no longer.
 
     A fixed object removes the motion beyond its level l, so the shortfall is :math:`\\max(0, h - l)` at height h. The
     level l minimises the residual, which must be less than that of :math:`c_2 h^2 + c_3 h^3`. The latter describes a
@@ -80,57 +78,55 @@ def find_cuts(conditioned: Conditioned, cycles: Cycles, demodulated: Demodulated
     their own values, so this causes no bias.
     """
     # A record whose crests are flat may show no noise at all.
-    rounding_m = ROUNDING * float(np.max(np.abs(demodulated.amplitude)))
-    least_m = max(conditioned.noise_m, (conditioned.quantum_m or 0.0) / math.sqrt(12.0), rounding_m)
-    unexplained = _of_windows(Windows.cut(conditioned, cycles.bounds), demodulated)
-    if not any(_cut_windows(unexplained, sign, least_m) for sign in (1.0, -1.0)):
+    rounding = ROUNDING * float(np.max(np.abs(windows.amplitude)))
+    least_noise = max(samples.noise, (samples.quantum or 0.0) / math.sqrt(12.0), rounding)
+    unexplained = _of_windows(WindowSamples.sliced(samples, cycles.bounds), windows)
+    if not any(_clipped_windows(unexplained, sign, least_noise) for sign in (1.0, -1.0)):
         return None
-    flags = conditioned.flags.copy()
+    flags = samples.flags.copy()
     seen = slice(int(cycles.bounds[0]), int(cycles.bounds[-1]))
-    flags[seen] = flags[seen] & ~np.uint8(Quality.CLIPPED) | conditioned.track.flags[seen]
-    windows = Windows.cut(replace(conditioned, flags=flags), cycles.bounds)
-    least = max(least_m, windows.tiny)
-    whole = _of_windows(windows, demodulated)
-    decay = np.interp(windows.centre, demodulated.t, demodulated.decay)
-    basis = windows.basis(np.full(decay.size, demodulated.angular_frequency), decay)
+    flags[seen] = flags[seen] & ~np.uint8(Quality.CLIPPED) | samples.track.flags[seen]
+    slices = WindowSamples.sliced(replace(samples, flags=flags), cycles.bounds)
+    least = max(least_noise, slices.tiny)
+    whole = _of_windows(slices, windows)
+    decay = np.interp(slices.centre, windows.t, windows.decay)
+    basis = slices.basis(np.full(decay.size, windows.angular_frequency), decay)
     inside = np.abs(whole.height(1.0)) < MIDDLE
     ends: list[_End] = []
     for step in range(2 * ROUNDS):
-        fit, sigma = _fitted(windows, basis, inside, least)
+        fit, sigma = _fitted(slices, basis, inside, least)
         inside = np.abs(fit.height(1.0)) < MIDDLE
-        if step < ROUNDS:  # the cut crests still affect the middle of the swing
+        if step < ROUNDS:  # the clipped crests still affect the middle of the swing
             continue
         ends = [end for sign in (1.0, -1.0) if (end := _end(fit, sign, sigma)) is not None]
         if not ends:
             return None
         inside = ~_beyond(fit, ends)
-    cuts = []
+    clippings = []
     for end in ends:
         beyond = _beyond(fit, [end]) & fit.judged
-        rows, height = windows.rows[beyond], end.sign * fit.model[beyond]
-        t, y = conditioned.track.t[rows], (fit.model + fit.residual)[beyond]
-        level_m = float(np.median(y[height >= np.median(height)])) + windows.level
-        from_m = float(end.sign * end.level + windows.level)
+        rows, height = slices.rows[beyond], end.sign * fit.model[beyond]
+        t, y = samples.track.t[rows], (fit.model + fit.residual)[beyond]
+        level = float(np.median(y[height >= np.median(height)])) + slices.level
+        beyond_level = float(end.sign * end.level + slices.level)
         which: Literal["far", "near"] = "far" if end.sign > 0.0 else "near"
-        cuts.append(Cut(which, from_m, level_m, int(t.size), float(t.min()), float(t.max())))
+        clippings.append(Clipping(which, beyond_level, level, int(t.size), float(t.min()), float(t.max())))
         flags[rows] |= np.uint8(Quality.CLIPPED)
-    levels_m = tuple(cut.level_m for cut in cuts)
-    return replace(conditioned, flags=flags, plateaus_m=levels_m, clipped_from_m=(), cuts=tuple(cuts))
+    levels = tuple(each.level for each in clippings)
+    return replace(samples, flags=flags, plateaus=levels, clipped_from=(), clippings=tuple(clippings))
 
 
-def _of_windows(windows: Windows, demodulated: Demodulated) -> _Fit:
+def _of_windows(slices: WindowSamples, windows: Windows) -> _Fit:
     """Return the fits that include the crests; their residuals still show a third of the shortfall."""
-    residual = np.nan_to_num(demodulated.residual[windows.rows])
-    rest, amplitude = (
-        np.interp(windows.centre, demodulated.t, x) for x in (demodulated.offset, np.abs(demodulated.amplitude))
-    )
-    model = windows.y - residual
-    return _Fit(rest - windows.level, amplitude, model, residual, np.zeros_like(model), windows.usable > 0)
+    residual = np.nan_to_num(windows.residual[slices.rows])
+    rest, amplitude = (np.interp(slices.centre, windows.t, x) for x in (windows.offset, np.abs(windows.amplitude)))
+    model = slices.y - residual
+    return _Fit(rest - slices.level, amplitude, model, residual, np.zeros_like(model), slices.usable > 0)
 
 
-def _fitted(windows: Windows, basis: F8, inside: Bools, least: float) -> tuple[_Fit, float]:
+def _fitted(slices: WindowSamples, basis: F8, inside: Bools, least: float) -> tuple[_Fit, float]:
     """Fit every window's sinusoid to selected samples without false echoes; return it and the noise, m."""
-    usable = windows.usable > 0
+    usable = slices.usable > 0
     solution = solve(basis, (inside & usable).astype(np.float64))
     middle = solution.residual[inside & usable & solution.good[:, None]]
     sigma = max(least, mad_sigma(middle)) if middle.size else least
@@ -138,13 +134,13 @@ def _fitted(windows: Windows, basis: F8, inside: Bools, least: float) -> tuple[_
     rest, a, b = solution.coefficients.T
     part = basis[:, :3]
     u = np.sqrt(np.maximum(np.sum(part * (solution.inverse @ part), axis=1), 0.0))
-    size = np.maximum(np.hypot(a, b), windows.tiny)
+    size = np.maximum(np.hypot(a, b), slices.tiny)
     judged = usable & solution.good[:, None]
-    return _Fit(rest, size, windows.y - solution.residual, solution.residual, u, judged), sigma
+    return _Fit(rest, size, slices.y - solution.residual, solution.residual, u, judged), sigma
 
 
-def _cut_windows(fit: _Fit, sign: float, sigma: float) -> int:
-    """Return the number of first windows whose crests are cut; 0 if noise can explain the shortfall."""
+def _clipped_windows(fit: _Fit, sign: float, sigma: float) -> int:
+    """Return the number of first windows whose crests are clipped; 0 if noise can explain the shortfall."""
     crest = fit.judged & (fit.height(sign) > CREST)
     count = crest.sum(axis=1)
     rows = np.flatnonzero(count >= FEWEST_FOR_MEDIAN)
@@ -156,20 +152,20 @@ def _cut_windows(fit: _Fit, sign: float, sigma: float) -> int:
     score = np.cumsum(z) / np.sqrt(np.arange(1, z.size + 1))
     score[: FEWEST_FOR_MEDIAN - 1] = -math.inf
     n = int(np.argmax(score))
-    # Three quarters of the crests must have a shortfall that one in twenty uncut ones has: echoes occur at some only.
+    # Three quarters of the crests must have a shortfall that one in twenty others has: echoes occur at some only.
     each = np.quantile(z[: n + 1], 0.25) >= normal_quantile(0.9)
     return int(rows[n]) + 1 if each and score[n] > normal_quantile(1.0 - FALSE_ALARM / z.size) else 0
 
 
 def _end(fit: _Fit, sign: float, sigma: float) -> _End | None:
-    """Return the level and the windows of a cut at one end, or None if the motion is not cut there."""
-    n = _cut_windows(fit, sign, sigma)
+    """Return the level and the windows clipped at one end, or None if the motion is not clipped there."""
+    n = _clipped_windows(fit, sign, sigma)
     outer = fit.judged[:n] & (fit.height(sign)[:n] > MIDDLE)
     if np.count_nonzero(outer) < FEWEST_FOR_MEDIAN:
         return None
     height, short = (sign * fit.model[:n])[outer], (-sign * fit.residual[:n])[outer]
     middle = float(np.median(sign * fit.rest[:n] + MIDDLE * fit.amplitude[:n]))
-    levels = np.linspace(middle, float(height.max()), LEVELS, endpoint=False)
+    levels = np.linspace(middle, float(height.max()), HEIGHTS, endpoint=False)
     left = np.sum(np.abs(short - np.maximum(height - levels[:, None], 0.0)), axis=1)
     best = int(np.argmin(left))
     share = fit.height(sign)[:n][outer]
@@ -182,7 +178,7 @@ def _end(fit: _Fit, sign: float, sigma: float) -> _End | None:
 
 
 def _beyond(fit: _Fit, ends: list[_End]) -> Bools:
-    """Return (w, l): whether the model at a sample or its neighbour lies beyond the level of a cut."""
+    """Return (w, l): whether the model at a sample or its neighbour lies beyond a level of clipping."""
     beyond = np.zeros(fit.model.shape, np.bool_)
     for end in ends:
         beyond[: end.windows] |= (end.sign * fit.model > end.level)[: end.windows]

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.numerics.robust import median
-from pipeline.samples.condition import Conditioned
+from pipeline.samples.condition import Samples
 from pipeline.track import F8
 
 # Samples over which a bob is judged to be moving or at rest: half of them deviate by two standard deviations of noise
@@ -15,29 +15,29 @@ from pipeline.track import F8
 BLOCK = 25
 
 
-def moving_part(conditioned: Conditioned, share: float) -> Conditioned | None:
+def moving_part(samples: Samples, share: float) -> Samples | None:
     """Return the record up to the bob's stop; None if the bob moves for a stated share of the samples, or never.
 
     If friction stops a bob early, the noise of the long rest hides the oscillation in the record's spectrum.
     """
-    if (stop := stop_row(conditioned)) is None:
+    if (stop := stop_row(samples)) is None:
         return None
-    rows = np.flatnonzero(conditioned.used)
+    rows = np.flatnonzero(samples.used)
     if not np.count_nonzero(rows < stop) < share * rows.size:
         return None
-    track = conditioned.track
-    cut = replace(track, t=track.t[:stop], y=track.y[:stop], flags=track.flags[:stop], velocity=None)
-    return replace(conditioned, track=cut, flags=conditioned.flags[:stop])
+    track = samples.track
+    moving = replace(track, t=track.t[:stop], y=track.y[:stop], flags=track.flags[:stop], velocity=None)
+    return replace(samples, track=moving, flags=samples.flags[:stop])
 
 
-def stop_row(conditioned: Conditioned) -> int | None:
+def stop_row(samples: Samples) -> int | None:
     """Return the index of the first sample at rest; None if the bob moves to the end, or never."""
-    rows = np.flatnonzero(conditioned.used)
+    rows = np.flatnonzero(samples.used)
     count = rows.size // BLOCK
-    noise = max(conditioned.noise_m, conditioned.quantum_m or 0.0)
+    noise = max(samples.noise, samples.quantum or 0.0)
     if count < 8 or not noise > 0.0:
         return None
-    y, blocks = conditioned.track.y, rows[: count * BLOCK].reshape(-1, BLOCK)
+    y, blocks = samples.track.y, rows[: count * BLOCK].reshape(-1, BLOCK)
     end = median(y[blocks[-max(count // 10, 2) :]].ravel())
     # With a quantised sensor, distances are whole steps: the margin lets two steps pass as two despite rounding.
     least = (2.0 + 1e-6) * noise

@@ -11,9 +11,9 @@ import pytest
 from scipy.optimize import least_squares
 
 from pipeline.numerics.estimate import Estimate
-from pipeline.results.compare import Comparison, SpringRun, compare_springs
-from pipeline.results.course import agreement
-from pipeline.results.masses import hooke
+from pipeline.several.compare import Comparison, SpringRun, compare_springs
+from pipeline.several.course import agreement
+from pipeline.several.masses import hooke
 
 
 def massless(runs: Sequence[SpringRun], mass_correlation: float = 0.0) -> Comparison:

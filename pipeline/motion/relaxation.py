@@ -1,4 +1,4 @@
-"""Overdamped motion: records in which damping ends the motion before it completes more than a few cycles.
+"""Relaxation motion: records in which damping ends the motion before it completes more than a few cycles.
 
 The model is the free motion of a linearly damped bob at any strength of damping,
 :math:`\\ddot x + 2g\\dot x + w x = 0` about a rest position o, from x = a with velocity v. Its parameters are
@@ -26,13 +26,13 @@ from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import CENTRAL_STEP, Fit
 from pipeline.numerics.levels import FEWEST_FOR_CURVE, MISFIT, STRONG, VERY_STRONG
-from pipeline.numerics.quantity import noun
 from pipeline.numerics.regression import covariance_of
-from pipeline.samples.condition import Conditioned
+from pipeline.samples.condition import Samples
 from pipeline.track import F8, Track
+from pipeline.units import noun
 from pipeline.windows.cycles import NoOscillation
 
-FAR = 20.0  # maximum change of the logarithm of a rate in the fit of a single exponential
+LARGEST_CHANGE = 20.0  # maximum change of the logarithm of a rate in the fit of a single exponential
 
 Shape = Callable[[F8, F8], F8]
 
@@ -161,11 +161,11 @@ def critical_decay(rows: Rows, near: Decay) -> Decay | None:
 def lone_exponential(rows: Rows, rate: float) -> tuple[float, float]:
     """Fit :math:`o + p e^{-rt}` from a start value of the rate (in 1/s), and return r and chi-square.
 
-    If the record shows no such rate the search diverges; r is limited to a factor of :data:`FAR`.
+    If the record shows no such rate the search diverges; r is limited to a factor of :data:`LARGEST_CHANGE`.
     """
     start = math.log(rate)
     end = LONE.fit(rows, np.array([start]))
-    return math.exp(min(max(float(end.values[-1]), start - FAR), start + FAR)), end.cost
+    return math.exp(min(max(float(end.values[-1]), start - LARGEST_CHANGE), start + LARGEST_CHANGE)), end.cost
 
 
 def _described(model: Relaxing, rows: Rows, end: Fit) -> Decay:
@@ -198,28 +198,28 @@ def _grid(rows: Rows, rate_hz: float) -> F8:
     return np.concatenate([best(damped, np.log(kind)) for kind in (apart, near, turning)])
 
 
-Kind = Literal["overdamped", "critical", "strong"]
+DampingKind = Literal["overdamped", "critical", "strong"]
 
 # Approximate number of block means to which a record is reduced before shapes are compared; all shapes then take 7 ms,
 # as measured.
-POINTS = 300
+BLOCK_MEANS = 300
 # Minimum damping ratio zeta of a strongly damped oscillation; below it the cycles are analysed instead.
 LEAST_DAMPING = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class Overdamped:
+class Relaxation:
     """A motion that relaxes with two rates or with one, or an oscillation whose damping ratio is large."""
 
     why: str  # one sentence that states the rates or the damping ratio
-    kind: Kind
+    kind: DampingKind
     damping_ratio: Estimate  # g/omega0
     squared_frequency: Estimate  # omega0^2; multiplied by the mass it is the spring constant
     estimates: Mapping[str, Estimate]
     start_s: float  # time at which the fitted part of the motion begins
 
 
-def find_overdamped(conditioned: Conditioned) -> Overdamped | NoOscillation | None:
+def find_relaxation(samples: Samples) -> Relaxation | NoOscillation | None:
     """Fit the free motion of a linearly damped bob and classify its damping.
 
     The result is :class:`NoOscillation` if the record is a single exponential, which a drift can resemble. It is None
@@ -230,15 +230,15 @@ def find_overdamped(conditioned: Conditioned) -> Overdamped | NoOscillation | No
     and that against a single exponential strong. Critical damping and the free fit are compared by BIC. If a record
     begins before the release, the fit begins where the displacement begins to fall.
     """
-    used = conditioned.used
-    t, y = conditioned.track.t[used], conditioned.track.y[used]
+    used = samples.used
+    t, y = samples.track.t[used], samples.track.y[used]
     if t.size < 2 * FEWEST_FOR_CURVE:
         return None
-    noise = max(conditioned.noise_m, (conditioned.quantum_m or 0.0) / math.sqrt(12.0), 1e-4 * float(np.ptp(y)))
+    noise = max(samples.noise, (samples.quantum or 0.0) / math.sqrt(12.0), 1e-4 * float(np.ptp(y)))
     if not (noise > 0.0 and _moves(y, noise)):
         return None
     for first in _starts(y, noise):
-        found = _follow(t[first:], y[first:], noise, conditioned)
+        found = _follow(t[first:], y[first:], noise, samples)
         if found is not None:
             return found
     return None
@@ -246,7 +246,7 @@ def find_overdamped(conditioned: Conditioned) -> Overdamped | NoOscillation | No
 
 def _moves(y: F8, noise: float) -> bool:
     """Return whether block means of the record vary enough for a relaxation to explain the variation."""
-    size = max(1, y.size // POINTS)
+    size = max(1, y.size // BLOCK_MEANS)
     values = y[: y.size // size * size].reshape(-1, size).mean(axis=1)
     excess = float(np.sum((values - values.mean()) ** 2)) * size / noise**2 - values.size
     return bool(excess > VERY_STRONG + 5.0 * math.log(values.size))
@@ -262,7 +262,7 @@ def _starts(y: F8, noise: float) -> Iterator[int]:
         yield int(held[-1])
 
 
-def _follow(t: F8, y: F8, noise: float, samples: Conditioned) -> Overdamped | NoOscillation | None:
+def _follow(t: F8, y: F8, noise: float, samples: Samples) -> Relaxation | NoOscillation | None:
     every = np.ones(t.size, np.bool_)
     rows, track = Rows(t - t[0], y, every, every, noise), samples.track
     found = best_decay(rows, track.rate_hz)
@@ -291,7 +291,7 @@ def _misses(rows: Rows, found: Decay) -> bool:
 
 def _beats_other_shapes(rows: Rows, found: Decay) -> bool:
     """Return whether the relaxation explains the record better than any polynomial, step or ramp does."""
-    size = max(1, rows.t.size // POINTS)
+    size = max(1, rows.t.size // BLOCK_MEANS)
     whole = rows.t.size // size * size
     each = (rows.t, rows.y, rows.left(DAMPED, found.values))
     t, values, left = (x[:whole].reshape(-1, size).mean(axis=1) for x in each)
@@ -324,7 +324,7 @@ def _left(design: F8, y: F8) -> float:
     return float(np.sum(residual**2))
 
 
-def _kind(rows: Rows, fit: Decay, fastest: float, unit: str) -> tuple[Kind, Decay] | NoOscillation | None:
+def _kind(rows: Rows, fit: Decay, fastest: float, unit: str) -> tuple[DampingKind, Decay] | NoOscillation | None:
     """Return the kind of damping with the lowest BIC and its fit, unless a single exponential suffices.
 
     None if the motion ends at a rate above ``fastest`` (in 1/s), that is between two samples, like a step.
@@ -347,7 +347,7 @@ def _kind(rows: Rows, fit: Decay, fastest: float, unit: str) -> tuple[Kind, Deca
     return ("overdamped" if fit.square > 0.0 else "strong"), fit
 
 
-def _classified(fit: Decay, kind: Kind, start_s: float, noise: Estimate, track: Track) -> Overdamped:
+def _classified(fit: Decay, kind: DampingKind, start_s: float, noise: Estimate, track: Track) -> Relaxation:
     from uncertainties import correlated_values, ufloat, umath
 
     unit = track.unit
@@ -384,14 +384,14 @@ def _classified(fit: Decay, kind: Kind, start_s: float, noise: Estimate, track: 
         found["damping_rate"] = _estimate(rate, "1/s")
         found["quality_factor"] = _estimate(0.5 * natural / rate, "")
         why = f"the oscillation is strongly damped: its damping ratio is {ratio}"
-    return Overdamped(why, kind, ratio, squared, found, start_s)
+    return Relaxation(why, kind, ratio, squared, found, start_s)
 
 
 def _estimate(quantity: Any, unit: str) -> Estimate:
     return Estimate(quantity.nominal_value, quantity.std_dev, unit)
 
 
-def spring_constant(found: Overdamped, scene: Scene) -> dict[str, Estimate]:
+def spring_constant(found: Relaxation, scene: Scene) -> dict[str, Estimate]:
     """Return :math:`k = \\omega_0^2 M` in N/m by name, M being the oscillating mass; empty without a bob's mass."""
     if scene.bob_mass_kg is None:
         return {}

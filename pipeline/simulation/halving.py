@@ -17,9 +17,9 @@ import numpy as np
 
 from pipeline.dynamics.equation import Problem
 from pipeline.dynamics.integrator import MOST_STEPS, Integrator, Trajectory, demand_times
-from pipeline.dynamics.methods import LEAST_RTOL, SolveIvp
 from pipeline.dynamics.strang import EXACT, STRANG
 from pipeline.errors import DynamicsError
+from pipeline.simulation.methods import LEAST_RTOL, SolveIvp
 
 LONGEST_STEP = 0.5  # maximum first step in rad; with fewer than six steps per cycle halving cannot estimate the error
 
@@ -131,7 +131,16 @@ def solved_once(
     running_s = timer() - started
     why = integrator.no_estimate(problem)
     if why:
-        return Solution(integrator, 1, problem, run, None, None, why, running_s)
+        return Solution(
+            integrator=integrator,
+            parts=1,
+            problem=problem,
+            trajectory=run,
+            error=None,
+            velocity_error=None,
+            no_estimate=why,
+            running_s=running_s,
+        )
     apart = (math.inf, math.inf)
     with contextlib.suppress(DynamicsError):  # too long a step may overflow
         apart = _difference(run, integrator.run(problem, 0.5 * spacing_s, 2 * count, every=2))

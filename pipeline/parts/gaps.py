@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from pipeline.errors import AnalysisError
 from pipeline.numerics.levels import FEWEST_FOR_CURVE, FEWEST_FOR_MEDIAN, NEGLIGIBLE, SIGNIFICANT
 from pipeline.numerics.regression import correlation_length, solve_weighted
-from pipeline.samples.condition import GAP, Conditioned
+from pipeline.parts.spans import Partition, Span, SpanKind
+from pipeline.samples.condition import GAP, Samples
 from pipeline.track import F8, Quality
 from pipeline.windows.cycles import Cycles, NoOscillation, find_cycles
 from pipeline.windows.demodulate import ROUNDING, demodulate
-from pipeline.windows.segments import Segments, Span, SpanKind
 
 
-def longest_part(samples: Conditioned) -> Segments | None:
+def longest_part(samples: Samples) -> Partition | None:
     """Return the longest part without a gap across which turns cannot be counted; None if it is the whole record.
 
     A gap is bridged if it is not longer than the longer of the parts beside it, and if the phase that a straight line
@@ -39,10 +39,10 @@ def longest_part(samples: Conditioned) -> Segments | None:
     chosen = stretches.index(part)
     spans = [Span(SpanKind.FREE, *each) for k, each in enumerate(stretches) if k != chosen]
     spans += [Span(SpanKind.GAP, a[1], b[0]) for a, b in itertools.pairwise(stretches)]
-    return Segments(*stretches[chosen], tuple(sorted(spans, key=lambda span: span.first_s)))
+    return Partition(*stretches[chosen], tuple(sorted(spans, key=lambda span: span.first_s)))
 
 
-def _oscillation(samples: Conditioned, rows: NDArray[np.bool_]) -> tuple[Conditioned, Cycles] | None:
+def _oscillation(samples: Samples, rows: NDArray[np.bool_]) -> tuple[Samples, Cycles] | None:
     """Return the record with all but some samples flagged, and its cycles; None if they show no oscillation."""
     part = replace(samples, flags=samples.flags | np.where(rows, np.uint8(0), np.uint8(Quality.OUTSIDE)))
     if np.count_nonzero(part.used) < FEWEST_FOR_CURVE or isinstance(cycles := find_cycles(part), NoOscillation):
@@ -50,7 +50,7 @@ def _oscillation(samples: Conditioned, rows: NDArray[np.bool_]) -> tuple[Conditi
     return part, cycles
 
 
-def _stretches(samples: Conditioned, t: F8) -> list[tuple[float, float]]:
+def _stretches(samples: Samples, t: F8) -> list[tuple[float, float]]:
     """Split the times of the samples used at every gap that is not bridged, beginning with the longest gap."""
     whole = [(float(t[0]), float(t[-1]))]
     steps = np.diff(t)
@@ -65,7 +65,7 @@ def _stretches(samples: Conditioned, t: F8) -> list[tuple[float, float]]:
     return [*_stretches(samples, t[: k + 1]), *_stretches(samples, t[k + 1 :])]
 
 
-def _phase_line(samples: Conditioned, rows: NDArray[np.bool_]) -> tuple[float, F8, F8] | None:
+def _phase_line(samples: Samples, rows: NDArray[np.bool_]) -> tuple[float, F8, F8] | None:
     """Fit a straight line to the phases of some samples; None if they do not show enough periods.
 
     It is returned as its middle, s, its level and slope there, and their covariance.
@@ -85,7 +85,7 @@ def _phase_line(samples: Conditioned, rows: NDArray[np.bool_]) -> tuple[float, F
     return middle_s, line.values, line.covariance * widening
 
 
-def _continues(samples: Conditioned, last_s: float, next_s: float) -> bool:
+def _continues(samples: Samples, last_s: float, next_s: float) -> bool:
     """Return whether the oscillation goes on across a gap with a known number of turns."""
     t, gap_s = samples.track.t, 0.5 * (last_s + next_s)
     lines = [line for rows in (t <= last_s, t >= next_s) if (line := _phase_line(samples, rows)) is not None]

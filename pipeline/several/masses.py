@@ -12,7 +12,7 @@ from pipeline.bench.spring import oscillating_mass_kg
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.levels import NEGLIGIBLE, SIGNIFICANT, coverage_factor
-from pipeline.results.compare import SpringRun, shared_covariance, spring_line
+from pipeline.several.compare import SpringRun, shared_covariance, spring_line
 from pipeline.track import F8
 
 GRAVITY = Estimate(9.81, 0.015, "m/s^2")  # 9.780 at the equator to 9.832 at the poles, uniformly distributed
@@ -56,14 +56,14 @@ def mass_line(runs: Sequence[SpringRun], mass_correlation: float = 0.0) -> MassL
     swinging = np.array([oscillating_mass_kg(spring_kg, load) for load in mass.tolist()])
     bend = slope * (swinging - mass - spring_kg / 3.0)
     return MassLine(
-        line.constant,
-        Estimate(spring_kg / 3.0, line.spring.u / 3.0, "kg"),
-        float(line.residual @ np.linalg.solve(covariance, line.residual)),
-        len(runs) - 2,
-        mass,
-        squared,
-        np.sqrt(np.diag(covariance)) * squared / line.constant.value,
-        bend,
+        constant=line.constant,
+        effective_mass=Estimate(spring_kg / 3.0, line.spring.u / 3.0, "kg"),
+        chi2=float(line.residual @ np.linalg.solve(covariance, line.residual)),
+        dof=len(runs) - 2,
+        mass_kg=mass,
+        squared_s2=squared,
+        u=np.sqrt(np.diag(covariance)) * squared / line.constant.value,
+        bend_s2=bend,
     )
 
 

@@ -1,4 +1,4 @@
-"""Sideways: modes beside the main oscillation, which make its amplitude and phase beat."""
+"""The search for modes beside the main oscillation, which make its amplitude and phase beat."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.numerics.levels import ROUNDS, SIGNIFICANT
-from pipeline.numerics.regression import beyond
-from pipeline.numerics.robust import mad_sigma
-from pipeline.numerics.spectrum import (
-    Band,
+from pipeline.modes.mode import Carrier, Mode, Modes
+from pipeline.modes.spectrum import (
     Blocks,
     Peak,
+    SearchBand,
     evidence_for,
     smooth_density,
     spectral_density,
     strongest,
     worth_a_look,
 )
-from pipeline.samples.condition import Conditioned
-from pipeline.track import F8, UNUSABLE
-from pipeline.windows.demodulate import Demodulated
-from pipeline.windows.modes import C16, Carrier, Mode, Sideways
+from pipeline.numerics.levels import ROUNDS, SIGNIFICANT
+from pipeline.numerics.regression import beyond
+from pipeline.numerics.robust import mad_sigma
+from pipeline.samples.condition import Samples
+from pipeline.track import C16, F8, UNUSABLE
+from pipeline.windows.demodulate import Windows
 
 # Multiples of the main frequency that bent scales and springs cause; they share the probability CHANCE.
 HARMONICS = (2, 3)
@@ -36,10 +36,10 @@ ENVELOPE = 4
 # count as modes, as measured by `python -m tests.golden --only n0.csv`.
 LEAST_WINDOWS = 6
 # Maximum length of a record, periods: a search in 18,000 of them takes 330 MB and 1.3 s, as measured.
-MOST_PERIODS = 4096
+LONGEST_SEARCH = 4096
 
 
-def find_sideways(conditioned: Conditioned, demodulated: Demodulated) -> Sideways:
+def find_modes(samples: Samples, windows: Windows) -> Modes:
     """Search for lines beside the main oscillation.
 
     The main oscillation is first removed as smooth curves through the windows' values. Then it is fitted together with
@@ -47,37 +47,37 @@ def find_sideways(conditioned: Conditioned, demodulated: Demodulated) -> Sideway
     A mode within a few reciprocals of the record's length of the main frequency is not searched for. It beats too
     slowly to be distinguished from a change of the amplitude.
     """
-    used = (demodulated.flags & UNUSABLE) == 0
-    t = conditioned.track.t[used]
-    if demodulated.t.size < LEAST_WINDOWS:
-        return Sideways((), None)
-    turn = 2.0 * math.pi / demodulated.angular_frequency
-    if float(t[-1] - t[0]) > MOST_PERIODS * turn:
-        return Sideways((), None)
-    carrier = Carrier.through(demodulated, float(t[0]), float(t[-1]))
-    residual = conditioned.track.y[used] - carrier.position(t)
+    used = (windows.flags & UNUSABLE) == 0
+    t = samples.track.t[used]
+    if windows.t.size < LEAST_WINDOWS:
+        return Modes(samples)
+    turn = 2.0 * math.pi / windows.angular_frequency
+    if float(t[-1] - t[0]) > LONGEST_SEARCH * turn:
+        return Modes(samples)
+    carrier = Carrier.through(windows, float(t[0]), float(t[-1]))
+    residual = samples.track.y[used] - carrier.position(t)
     spread = mad_sigma(residual)
     if spread == 0.0:
-        return Sideways((), carrier)
+        return Modes(samples, carrier=carrier)
     believed = np.abs(residual) <= 8.0 * spread
-    blocks = Blocks.of(t[believed], residual[believed], turn / 12.0, conditioned.track.rate_hz)
+    blocks = Blocks.of(t[believed], residual[believed], turn / 12.0, samples.track.rate_hz)
     band = _band(carrier, blocks)
     multiples = tuple(turns * carrier.angular_frequency / (2.0 * math.pi) for turns in HARMONICS)
     if not worth_a_look(blocks, band, multiples, CHANCE):
-        return Sideways((), carrier)
-    return _Search(carrier, blocks, band).run()
+        return Modes(samples, carrier=carrier)
+    return Modes(samples, _Search(carrier, blocks, band).run(), carrier)
 
 
-def _band(carrier: Carrier, blocks: Blocks) -> Band:
+def _band(carrier: Carrier, blocks: Blocks) -> SearchBand:
     main, bin_hz = carrier.angular_frequency / (2.0 * math.pi), 1.0 / blocks.seconds
     low = max((0.5 * carrier.rest_degree + 2.0) * bin_hz, 0.1 * main)
-    return Band(low, min(3.4 * main, 0.4 / blocks.step), ((main, (0.5 * carrier.degree + 2.0) * bin_hz),))
+    return SearchBand(low, min(3.4 * main, 0.4 / blocks.step), ((main, (0.5 * carrier.degree + 2.0) * bin_hz),))
 
 
 class _Search:
     """The model of the blocks, which grows mode by mode."""
 
-    def __init__(self, carrier: Carrier, blocks: Blocks, band: Band) -> None:
+    def __init__(self, carrier: Carrier, blocks: Blocks, band: SearchBand) -> None:
         self.carrier, self.blocks, self.band = carrier, blocks, band
         self.t = blocks.t + blocks.origin
         self.main = carrier.wave(self.t)
@@ -89,7 +89,7 @@ class _Search:
         self.add(_main_columns(carrier, self.t) * blocks.weight[:, None])
         self.found = list[Mode]()
 
-    def run(self) -> Sideways:
+    def run(self) -> tuple[Mode, ...]:
         """Return the modes, strongest first, then the harmonics, all fitted together."""
         self.harmonics()
         width = 2.0 / self.blocks.seconds
@@ -104,7 +104,7 @@ class _Search:
             self.add(columns)
             self.found.append(mode)
             self.hole((mode.frequency_hz, width))
-        return Sideways(tuple(sorted(self.together(), key=lambda mode: mode.turns > 0)), self.carrier)
+        return tuple(sorted(self.together(), key=lambda mode: mode.turns > 0))
 
     def together(self) -> Iterator[Mode]:
         """Fit the coefficients of all modes together, because each was first fitted without the later ones."""
@@ -114,7 +114,7 @@ class _Search:
         for mode, start, end in zip(self.found, ends[:-1], ends[1:], strict=True):
             refitted = replace(mode, coefficients=envelopes[start:end])
             sizes = np.abs(refitted.envelope(self.t) * refitted.wave(self.t, self.main))
-            yield replace(refitted, amplitude_m=float(np.sqrt(np.mean(sizes**2))))
+            yield replace(refitted, amplitude=float(np.sqrt(np.mean(sizes**2))))
 
     def hole(self, *holes: tuple[float, float]) -> None:
         self.band = replace(self.band, holes=(*self.band.holes, *holes))

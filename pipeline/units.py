@@ -10,7 +10,7 @@ from functools import cache
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class DisplayUnit:
     """Name and display unit of the values in one unit."""
 
     noun: str  # name of one value
@@ -18,15 +18,15 @@ class Shown:
     factor: float  # factor from the record's unit to ``unit``
 
 
-SHOWN = {
-    "m": Shown("distance", "mm", 1e3),
-    "rad": Shown("angle", "rad", 1.0),
-    "m/s": Shown("velocity", "m/s", 1.0),
-    "rad/s": Shown("angular velocity", "rad/s", 1.0),
-    "m/s^2": Shown("acceleration", "m/s^2", 1.0),
-    "N": Shown("force", "N", 1.0),
-    "V": Shown("voltage", "V", 1.0),
-    "1": Shown("value", "", 1.0),
+DISPLAY_UNITS = {
+    "m": DisplayUnit("distance", "mm", 1e3),
+    "rad": DisplayUnit("angle", "rad", 1.0),
+    "m/s": DisplayUnit("velocity", "m/s", 1.0),
+    "rad/s": DisplayUnit("angular velocity", "rad/s", 1.0),
+    "m/s^2": DisplayUnit("acceleration", "m/s^2", 1.0),
+    "N": DisplayUnit("force", "N", 1.0),
+    "V": DisplayUnit("voltage", "V", 1.0),
+    "1": DisplayUnit("value", "", 1.0),
 }
 """Names and display units by the units of :data:`pipeline.track.UNITS`."""
 
@@ -163,7 +163,7 @@ def amount(value: float, unit: str, form: str = ".2g") -> str:
     >>> amount(0.00234, "m"), amount(23.945, "m", ".4g"), amount(0.0234, "rad"), amount(1.2345678, "V", ".1f")
     ('2.3 mm', '23.95 m', '0.023 rad', '1.235 V')
     """
-    shown = SHOWN[unit]
+    shown = DISPLAY_UNITS[unit]
     if unit == "m" and abs(value) >= 1.0:
         return f"{number(value, form if form.endswith('g') else '.4g')} m"
     if unit != "m" and form.endswith("f"):
@@ -173,7 +173,7 @@ def amount(value: float, unit: str, form: str = ".2g") -> str:
 
 def noun(unit: str) -> str:
     """Return the noun for a value of a record in this unit."""
-    return SHOWN[unit].noun
+    return DISPLAY_UNITS[unit].noun
 
 
 def plural(unit: str) -> str:
@@ -182,5 +182,5 @@ def plural(unit: str) -> str:
     >>> plural("m"), plural("rad/s")
     ('distances', 'angular velocities')
     """
-    own = SHOWN[unit].noun
+    own = DISPLAY_UNITS[unit].noun
     return f"{own[:-1]}ies" if own.endswith("y") else f"{own}s"

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from pipeline.bench.scene import Scene
-from pipeline.dynamics.band import spread
 from pipeline.errors import DynamicsError
+from pipeline.simulation.band import spread
 
 LINEAR: dict[str, Any] = {
     "bob": {"mass_kg": {"value": 0.2, "u": 2e-5}},

@@ -10,7 +10,7 @@ Severity = Literal["info", "warning", "error"]
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class Notice:
     """What a stage found: a code, and its numbers or names as the sentences in ``findings.toml`` call them.
 
     A number is in SI units, its name ends in the unit, and None means that there is none. Without a severity it is the
