@@ -63,6 +63,9 @@ def header(lines: Sequence[str]) -> Header | None:
     # The last row may be incomplete.
     columns = columns_of(table.rows[:-1] if len(table.rows) > _FEWEST else table.rows)
     headings, words = list(table.headings), _words(table)
+    for at in words:  # rows of several sensors may have the same times
+        of_one = [row for row in table.rows if row[at] == table.rows[0][at]]
+        columns = columns_of(of_one) if len(of_one) >= _FEWEST else columns
     times, formula, traps = times_by_name(table, columns), table.formula, list(table.traps)
     clocks = [at for at, cells in enumerate(zip(*table.rows, strict=True)) if _are_clocks(cells)]
     unread = "" if times or formula is not None else _unread_times(table, clocks)
@@ -200,11 +203,14 @@ def _as_columns(text: Text) -> Text:
         return text
     plain = [re.sub(r"^\s*\w+\s*=", "", line).strip(" [](){};\t") for line in lines]
     mark = next((mark for mark in "\t;," if mark in plain[0]), None)
-    rows = [[cell.strip(' "') for cell in line.strip(f"{mark or ''} ").split(mark)] for line in plain]
+    rows = [split_heading(line.strip(f"{mark} "), mark)[0] if mark else line.split() for line in plain]
     full = rows[:-1] or rows  # the last line of a head is cut
-    if any(len(row) < _FEWEST_LONG or any(parse_number(cell) is None for cell in row[1:]) for row in full):
+    numbers = [cell for row in full for cell in row[1:]]
+    if min(map(len, full)) < _FEWEST_LONG or any(
+        parse_number(cell) is None and not is_time_cell(cell) for cell in numbers
+    ):
         return text
-    return Text.of("\n".join("\t".join(cells) for cells in zip_longest(*rows, fillvalue="")).encode())
+    return Text.of("\n".join(["\t".join(cells) for cells in zip_longest(*rows, fillvalue="")] + [""]).encode())
 
 
 def _with_units_apart(text: Text) -> Text:

@@ -52,8 +52,22 @@ def find_table(lines: tuple[str, ...]) -> Header | None:
     for order, mark in enumerate(separator_line[1] if separator_line else _MARKS):
         # Without its mark each line is a single cell, a case that the first separator has covered.
         if (not order or not mark or any(mark in each for each in lines)) and (table := _split_by(lines, mark)):
-            candidates.append(((table.lines, not table.named, not _is_separator(table), order), table))
+            candidates.append(((_is_torn(table), table.lines, not table.named, not _is_separator(table), order), table))
     return min(candidates)[1] if candidates else None
+
+
+def _is_torn(table: Header) -> bool:
+    """Return whether a cell has another separator inside, or a time and a number: its comma is a decimal comma."""
+    return any(
+        any(mark in cell for mark in "\t;") or (" " in cell and _holds_time_and_number(cell))
+        for cell in table.rows[0]
+        if parse_number(cell) is None
+    )
+
+
+def _holds_time_and_number(cell: str) -> bool:
+    time, _, number = cell.rpartition(" ")
+    return not is_time_cell(cell) and is_time_cell(time) and parse_number(number) is not None
 
 
 def _is_separator(table: Header) -> bool:

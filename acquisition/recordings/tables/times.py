@@ -41,6 +41,7 @@ CLOCK = re.compile(
 )
 _SEARCHED = re.compile(rf"(?<!\d)(?<!\d\.){_CORE}(?![\d:])", re.ASCII)
 _COMPACT = re.compile(r"(?<!\d)(\d{4})(\d\d)(\d\d)[t ]?(\d\d)(\d\d)(\d\d)(?=[.,z+-]|$)")
+_DATE = re.compile(r"\d{1,4} ?[-./] ?\d{1,2} ?[-./] ?\d{1,4}\.?[t,]?|\d{4}")
 _ZONE = re.compile(r"^ ?[+-]\d\d:?\d\d|\b(utc|gmt|z|ce?s?t|uhr|kl)\b\.?")
 _SIGNS_OF_TIME = str.maketrans(
     {
@@ -76,6 +77,8 @@ class ClockTime(NamedTuple):
 def clock_s(cell: str) -> ClockTime | None:
     """Return the time of day in a cell, with the date if its order of day and month is clear; None for other text."""
     match = CLOCK.fullmatch(cell)
+    if match is None and ("\t" in cell or ";" in cell):
+        return None
     if match is not None:
         return _clock(match, _numeric_day((match["date"] or "").strip(" ,T")), (match["half"] or "").lower()[:1])
     text = _COMPACT.sub(r"\1-\2-\3 \4:\5:\6", cell.casefold().translate(_SIGNS_OF_TIME)).strip(" '")
@@ -91,7 +94,7 @@ def clock_s(cell: str) -> ClockTime | None:
         return _clock(match, 0, half)
     if len(months) != 1 or len(numbers) not in (1, 2):
         day = _numeric_day("".join(beside.split()).strip("t,-"))
-        return _clock(match, day, half) if re.fullmatch(r"[\d\s./,t-]+", beside) else None
+        return _clock(match, day, half) if _DATE.fullmatch(beside) else None
     day, year = numbers if len(numbers) == 2 else (numbers[0], 1970)
     if day > 31:
         day, year = year, day

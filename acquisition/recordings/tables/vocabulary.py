@@ -37,11 +37,13 @@ SPAN = _pattern(r"^(?-i:T)\b|^[Ττ]|period|durat|dauer|half|halb|interval|tau|d
 """Names of durations, which are not times of samples."""
 AM = _pattern(
     r"(?<![^\W\d_])"
-    r"(?:a\.? ?m\.?|de\.|öö|πμ|π\.μ\.|ص|ق\.ظ\.|上午|午前|早上|오전|sa|fm|f\.m\.|dop\.|vm\.?|vorm\.)(?![^\W\d_])"
+    r"(?:a\.? ?m\.?|de\.|öö|дп|לפנה״צ"
+    r"|πμ|π\.μ\.|ص|ق\.ظ\.|上午|午前|早上|오전|sa|fm|f\.m\.|dop\.|vm\.?|vorm\.)(?![^\W\d_])"
 )
 PM = _pattern(
     r"(?<![^\W\d_])"
-    r"(?:p\.? ?m\.?|du\.|ös|μμ|μ\.μ\.|م|ب\.ظ\.|下午|午後|晚上|오후|ch|em|e\.m\.|odp\.|nm\.?|nachm\.)(?![^\W\d_])"
+    r"(?:p\.? ?m\.?|du\.|ös|пп|אחה״צ"
+    r"|μμ|μ\.μ\.|م|ب\.ظ\.|下午|午後|晚上|오후|ch|em|e\.m\.|odp\.|nm\.?|nachm\.)(?![^\W\d_])"
 )
 """Words for the halves of the day; the word for the second half is looked for first."""
 MONTHS = tuple(
