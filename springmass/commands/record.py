@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import queue
 import shlex
 import sys
 from collections.abc import Iterator
@@ -47,7 +46,7 @@ from springmass.session.bench_requests import Closed, Operator
 from springmass.session.detect import name_sensors
 from springmass.session.file_names import default_name, demand_new
 from springmass.session.sensors import OpenSensor
-from springmass.session.session import BYTES_PER_READ, Ended, RunLimits, RunListeners, Session
+from springmass.session.session import BYTES_PER_READ, Ended, Marks, RunLimits, RunListeners, Session
 from springmass.session.trigger import Disarmed, Trigger
 from springmass.simulations.bench import EXAMPLE, REST_M, Release, bench_position
 from springmass.stops import STOPS, EndReason
@@ -154,29 +153,27 @@ def record(
             title=options.title,
             stops=STOPS,
         )
-        STOPS.last_words = lambda: _stopped(session, log)
         console = Console(lambda error: session.failures.note("stderr", error))
         beside.callback(console.close)
-        page = None
+        page, marks = None, Marks()
         try:
             if options.page:
                 words = option_words(vars(page_options))
-                process = PageProcess(words, log, queue.SimpleQueue(), STOPS, session.failures, console.line)
-                page = beside.enter_context(process)
-            ended = _Bench(session, options, log, console, release, page).record()
-            session.stop()
-            failed, status = session.failures.describe(), ended.status
-            if status.error:
-                failed.append(f"springmass: {status.error}")
-                failed.append(f"springmass: {status.dropped_records} records that came later were not kept")
-            for line in failed:
-                console.line(line)
-            code, run_file, sentences = _built(ended, out, session)
+                page = beside.enter_context(PageProcess(words, log, marks, STOPS, session.failures, console.line))
+            with STOPS.leaving(lambda: _stopped(session, log)):
+                ended = _Bench(session, options, log, console, release, page, marks).record()
+                session.stop()
+                failed, status = session.failures.describe(), ended.status
+                if status.error:
+                    failed.append(f"springmass: {status.error}")
+                    failed.append(f"springmass: {status.dropped_records} records that came later were not kept")
+                for line in failed:
+                    console.line(line)
+                code, run_file, sentences = _built(ended, out, session)
             for line in sentences:
                 console.line(line)
             if run_file is not None and watched(sys.stderr):
                 console.line(f"next: springmass analyse {shlex.quote(str(run_file))}")
-            session.recorder = None
             if page is not None and run_file is not None and ended.by is EndReason.PAGE:
                 page.tell("built", run=str(run_file))
                 page.attend()
@@ -270,6 +267,7 @@ class _Bench:
     console: Console
     release: Release
     page: PageProcess | None
+    marks: Marks
 
     def record(self) -> Ended:
         """Run the session, with a page from before its beginning to its end."""
@@ -298,11 +296,9 @@ class _Bench:
 
     def _recorded(self, limits: RunLimits, operator: Operator | None) -> Ended:
         style = style_of(sys.stderr)
-        with marks_by_keys(watched=style.terminal) as typed:
-            marks = typed
-            if self.page is not None:
-                marks = self.page.marks = self.page.marks if typed is None else typed
-            show = ProgressLine(self.console, style, keys=typed is not None)
+        with marks_by_keys(self.marks, watched=style.terminal) as typed:
+            marks = self.marks if typed or self.page is not None else None
+            show = ProgressLine(self.console, style, keys=typed)
             listeners = RunListeners(progress=show, marks=marks)
             try:
                 if operator is None:
