@@ -7,6 +7,10 @@ from dataclasses import dataclass
 
 from pipeline.units import Unit
 
+# What a value may come from: the times and the distances (or other values) of the record, the scene, one frequency, and
+# a law of damping.
+MODEL_PARTS = ("times", "distances", "scene", "frequency", "damping")
+
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
@@ -20,6 +24,7 @@ class Quantity:
     page_symbol: str
     tex_symbol: str
     unit: str | Unit  # SI unit; a Unit if it depends on what was recorded
+    parts: tuple[str, ...]  # parts of the model from which the value comes, of :data:`MODEL_PARTS`
     in_table: bool = True  # whether Table 1 shows the estimate
     by_law: bool = False  # whether Table 1 names the damping law of the estimate, because its value depends on the law
 
@@ -41,39 +46,49 @@ class Input:
     unit: str | Unit = ""  # as :attr:`Quantity.unit`; "" for a ratio or a group
 
 
+_OF_TIMES, _OF_SIZES = ("times",), ("distances",)
+_OF_PHASE = ("times", "frequency")
+_OF_MOTION = ("distances", *_OF_PHASE)
+_OF_RATE, _OF_DRAG = ("times", "damping"), ("distances", "times", "damping")
+_OF_FLOW = (*_OF_MOTION, "scene")
+
 _QUANTITIES = (
-    Quantity("period", "period", "T", "T", "T", "s"),
-    Quantity("period_small_swings", "period of very small swings", "T_s", "T s", r"T_\mathrm{s}", "s"),
-    Quantity("first_mode_period", "period of the first mode", "T_1", "T 1", "T_1", "s"),
-    Quantity("second_mode_period", "period of the second mode", "T_2", "T 2", "T_2", "s"),
-    Quantity("first_mode_amplitude", "amplitude of the first mode", "A_1", "A 1", "A_1", Unit(1)),
-    Quantity("second_mode_amplitude", "amplitude of the second mode", "A_2", "A 2", "A_2", Unit(1)),
-    Quantity("frequency", "frequency", "f", "f", "f", "Hz"),
-    Quantity("angular_frequency", "angular frequency", "omega", "ω", r"\omega", "rad/s"),
-    Quantity("spring_constant", "spring constant", "k", "k", "k", "N/m"),
-    Quantity("gravity", "acceleration of gravity", "g", "g", "g", "m/s^2"),
-    Quantity("amplitude", "amplitude at the start", "A0", "A₀", "A_0", Unit(1)),
-    Quantity("displacement_amplitude", "amplitude of the displacement", "x0", "x₀", "x_0", "m"),
-    Quantity("angle_amplitude", "amplitude of the angle", "theta0", "θ₀", r"\theta_0", "rad"),
-    Quantity("phase", "phase at the start", "phi0", "φ₀", r"\varphi_0", "rad", in_table=False),
-    Quantity("offset", "rest position", "y0", "y₀", "y_0", Unit(1)),
-    Quantity("noise", "noise of one sample", "sigma", "σ", r"\sigma", Unit(1)),
-    Quantity("damping_rate", "damping rate at the start", "lambda", "λ", r"\lambda", "1/s", by_law=True),
-    Quantity("relaxation_rate", "relaxation rate", "r", "r", "r", "1/s"),
-    Quantity("relaxation_rate_slow", "slow relaxation rate", "r_1", "r 1", "r_1", "1/s"),
-    Quantity("relaxation_rate_fast", "fast relaxation rate", "r_2", "r 2", "r_2", "1/s"),
-    Quantity("quality_factor", "quality factor", "Q", "Q", "Q", "", by_law=True),
+    Quantity("period", "period", "T", "T", "T", "s", _OF_PHASE),
+    Quantity("period_small_swings", "period of very small swings", "T_s", "T s", r"T_\mathrm{s}", "s", _OF_TIMES),
+    Quantity("first_mode_period", "period of the first mode", "T_1", "T 1", "T_1", "s", _OF_TIMES),
+    Quantity("second_mode_period", "period of the second mode", "T_2", "T 2", "T_2", "s", _OF_TIMES),
+    Quantity("first_mode_amplitude", "amplitude of the first mode", "A_1", "A 1", "A_1", Unit(1), _OF_SIZES),
+    Quantity("second_mode_amplitude", "amplitude of the second mode", "A_2", "A 2", "A_2", Unit(1), _OF_SIZES),
+    Quantity("frequency", "frequency", "f", "f", "f", "Hz", _OF_PHASE),
+    Quantity("angular_frequency", "angular frequency", "omega", "ω", r"\omega", "rad/s", _OF_PHASE),
+    Quantity("spring_constant", "spring constant", "k", "k", "k", "N/m", (*_OF_PHASE, "scene")),
+    Quantity("gravity", "acceleration of gravity", "g", "g", "g", "m/s^2", ("times", "scene")),
+    Quantity("amplitude", "amplitude at the start", "A0", "A₀", "A_0", Unit(1), _OF_SIZES),
+    Quantity("displacement_amplitude", "amplitude of the displacement", "x0", "x₀", "x_0", "m", _OF_MOTION),
+    Quantity("angle_amplitude", "amplitude of the angle", "theta0", "θ₀", r"\theta_0", "rad", _OF_MOTION),
+    Quantity("phase", "phase at the start", "phi0", "φ₀", r"\varphi_0", "rad", _OF_PHASE, in_table=False),
+    Quantity("offset", "rest position", "y0", "y₀", "y_0", Unit(1), _OF_SIZES),
+    Quantity("noise", "noise of one sample", "sigma", "σ", r"\sigma", Unit(1), _OF_SIZES),
+    Quantity("damping_rate", "damping rate at the start", "lambda", "λ", r"\lambda", "1/s", _OF_RATE, by_law=True),
+    Quantity("relaxation_rate", "relaxation rate", "r", "r", "r", "1/s", _OF_TIMES),
+    Quantity("relaxation_rate_slow", "slow relaxation rate", "r_1", "r 1", "r_1", "1/s", _OF_TIMES),
+    Quantity("relaxation_rate_fast", "fast relaxation rate", "r_2", "r 2", "r_2", "1/s", _OF_TIMES),
+    Quantity("quality_factor", "quality factor", "Q", "Q", "Q", "", ("frequency", "damping"), by_law=True),
     # The velocity of the motion; it is in rad/s if an angle or its rate was recorded.
-    Quantity("velocity_rms", "velocity, root mean square", "v_rms", "v rms", r"v_\mathrm{rms}", "m/s"),
-    Quantity("reynolds_number", "Reynolds number", "Re", "Re", r"\mathit{Re}", ""),
-    Quantity("reynolds_number_start", "Reynolds number at the start", "Re_0", "Re 0", r"\mathit{Re}_0", ""),
-    Quantity("keulegan_carpenter_number", "Keulegan-Carpenter number", "KC", "KC", r"\mathit{KC}", ""),
-    Quantity("drag_coefficient", "quadratic drag coefficient", "C_d", "C d", r"C_\mathrm{d}", ""),
-    Quantity("gamma", "linear damping", "gamma", "γ", r"\gamma", "1/s", by_law=True),
-    Quantity("beta", "quadratic damping", "beta", "β", r"\beta", Unit(-1, -1), by_law=True),
-    Quantity("mu", "dry friction", "mu", "μ", r"\mu", Unit(1, -1), by_law=True),
-    Quantity("c", "drag by a power of the amplitude", "c", "c", "c", Unit(1, -1, less="n"), by_law=True),
-    Quantity("n", "that power", "n", "n", "n", "", by_law=True),
+    Quantity("velocity_rms", "velocity, root mean square", "v_rms", "v rms", r"v_\mathrm{rms}", "m/s", _OF_MOTION),
+    Quantity("reynolds_number", "Reynolds number", "Re", "Re", r"\mathit{Re}", "", _OF_FLOW),
+    Quantity("reynolds_number_start", "Reynolds number at the start", "Re_0", "Re 0", r"\mathit{Re}_0", "", _OF_FLOW),
+    Quantity(
+        "keulegan_carpenter_number", "Keulegan-Carpenter number", "KC", "KC", r"\mathit{KC}", "", ("distances", "scene")
+    ),
+    Quantity(
+        "drag_coefficient", "quadratic drag coefficient", "C_d", "C d", r"C_\mathrm{d}", "", (*_OF_FLOW, "damping")
+    ),
+    Quantity("gamma", "linear damping", "gamma", "γ", r"\gamma", "1/s", _OF_RATE, by_law=True),
+    Quantity("beta", "quadratic damping", "beta", "β", r"\beta", Unit(-1, -1), _OF_DRAG, by_law=True),
+    Quantity("mu", "dry friction", "mu", "μ", r"\mu", Unit(1, -1), _OF_DRAG, by_law=True),
+    Quantity("c", "drag by a power of the amplitude", "c", "c", "c", Unit(1, -1, less="n"), _OF_DRAG, by_law=True),
+    Quantity("n", "that power", "n", "n", "n", "", ("damping",), by_law=True),
 )
 QUANTITIES: Mapping[str, Quantity] = {quantity.name: quantity for quantity in _QUANTITIES}
 """All estimates by name, in the order of Table 1."""

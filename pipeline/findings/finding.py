@@ -35,6 +35,8 @@ class FindingKind:
     advice: tuple[str, ...] = ("",)
     figure: str = ""
     harm: str = "uncertainty"
+    doubts: tuple[str, ...] = ()
+    doubts_above: Mapping[str, float] = field(default_factory=dict)
     about: tuple[str, ...] = ()
     consequence: str | None = None
 
@@ -68,7 +70,7 @@ def kinds() -> Mapping[str, FindingKind]:
 
 
 def _field(name: str, value: Any) -> Any:
-    if name in ("severity", "says", "details", "advice", "about"):
+    if name in ("severity", "says", "details", "advice", "doubts", "about"):
         return (value,) if isinstance(value, str) else tuple(value)
     return value
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pipeline.analyse import Analysis, Oscillation, Relaxation
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.regression import scatter
 from pipeline.results.classic import CYCLES, Classic
 from pipeline.results.curves import Curve, Smoothed
 from pipeline.track import F8, UNUSABLE, Quality
@@ -193,17 +194,21 @@ def _law_lines(a: Analysis, motion: Oscillation, laws: Sequence[str] | None) -> 
 def frequency(a: Analysis) -> Chart | None:
     """Frequency of stretches of the run against their amplitude, with the model of the phase.
 
-    In each stretch a straight line is fitted to the phases of its windows, weighted by their inverse variances, which
-    are multiplied by the reduced chi-square of all phases if that exceeds one.
+    In each stretch a straight line is fitted to the phases of its windows, weighted by their inverse variances. These
+    include the scatter of the windows about a smooth curve and its correlation, or the misfit of all phases if that is
+    larger.
     """
     if not isinstance(a.motion, Oscillation) or a.motion.windows.t.size < FEWEST_WINDOWS:
         return None
     phase, windows = a.motion.phase, a.motion.windows
     order = np.argsort(windows.t, kind="stable")
+    own = windows.covariance[:, 1, 1]
+    spread = scatter(windows.t, phase.residual, np.sqrt(own))
+    variance = np.maximum(spread.u**2 * spread.correlation, own * max(phase.reduced_chi2, 1.0))
     points = []
     for part in np.array_split(order, min(MOST_STRETCHES, order.size // 2)):
         t, turned = windows.t[part], windows.phase[part]
-        weight = 1.0 / np.maximum(windows.covariance[part, 1, 1] * max(phase.reduced_chi2, 1.0), 1e-30)
+        weight = 1.0 / np.maximum(variance[part], 1e-30)
         (slope, _), covariance = np.polyfit(t - t.mean(), turned, 1, w=np.sqrt(weight), cov="unscaled")
         points.append((float(np.mean(windows.amplitude[part])), slope, covariance[0, 0] ** 0.5))
     size, slope, u = np.array(sorted(points), np.float64).T

@@ -19,6 +19,7 @@ from pipeline.results.budget import Contribution
 from springmass import __version__
 from springmass.loading.loaded import Loaded
 from springmass.loading.save import now_utc
+from springmass.result.grades import grades_json
 
 if TYPE_CHECKING:
     from springmass.runs.run import Run
@@ -36,6 +37,7 @@ NO_DETAILS: Mapping[str, Any] = {
         "coefficients": {},
         "laws": {},
     },
+    "grades": {},
 }
 
 
@@ -55,7 +57,12 @@ def result_of(run: Run) -> dict[str, Any]:
     if classic is not None or not isinstance(motion, Oscillation):
         detailed = NO_DETAILS
     else:
-        detailed = {"budget": _budgets(motion), "correlations": _correlations(motion), "damping": _damping(motion)}
+        detailed = {
+            "budget": _budgets(motion),
+            "correlations": _correlations(motion),
+            "damping": _damping(motion),
+            "grades": grades_json(analysis),
+        }
     content = {
         "schema": RESULT_SCHEMA,
         "input": input_of(loaded),
