@@ -13,8 +13,8 @@ from pipeline.numerics.levels import OUTLIER
 from pipeline.numerics.robust import mad_sigma, median
 from pipeline.track import F8
 
-# Maximum degree of the polynomial that is the smooth curve through a run. It follows a decay to a seventh within 3e-6 of
-# the start and to a twentieth within 3e-5, measured by ``numpy.polynomial.Legendre.fit``.
+# Maximum degree of the polynomial that is the smooth curve through a run. It follows a decay to a seventh within 3e-6
+# of the start and to a twentieth within 3e-5, measured by ``numpy.polynomial.Legendre.fit``.
 DEGREE = 6
 
 

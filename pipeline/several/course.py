@@ -11,13 +11,14 @@ import numpy as np
 
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.levels import FEWEST_FOR_MEDIAN, NEGLIGIBLE, NOTICEABLE, OUTLIER, coverage_factor
+from pipeline.numerics.levels import FEWEST_FOR_MEDIAN, NEGLIGIBLE, OUTLIER, coverage_factor
 from pipeline.numerics.robust import mad_sigma
 from pipeline.several.compare import Comparison, SpringRun, compare_springs
 
 # Maximum number of runs compared as those of one bench, which takes 0.3 s as measured if they disagree; of a larger
 # group only far runs are named.
 LARGEST_BENCH = 50
+LITTLE = 0.005  # relative spread of one bench's constants up to which no run is blamed: springs are not ideal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -180,7 +181,7 @@ def judged(runs: Sequence[CourseRun]) -> tuple[tuple[Suspect, ...], tuple[Disagr
         constants = [k.value for k in comparison.each]
         low, high = min(constants), max(constants)
         spread = high / low - 1.0
-        if spread > NOTICEABLE and (odd := _odd_one(rest)) is not None:
+        if spread > LITTLE and (odd := _odd_one(rest)) is not None:
             others = f"without it, the other {len(rest) - 1} runs of its bench and spring agree"
             found[odd.name] = Suspect(odd.name, f"{others}: look at its mass and its spring")
         else:
