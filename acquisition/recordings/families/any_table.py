@@ -201,7 +201,7 @@ def _as_columns(text: Text) -> Text:
     lines = [line for line in text.lines(0, 3 * _MOST_LONG) if line.strip()]
     if not 0 < len(lines) <= _MOST_LONG or len(text) > 3 * _MOST_LONG:
         return text
-    plain = [re.sub(r"^\s*\w+\s*=", "", line).strip(" [](){};\t") for line in lines]
+    plain = [re.sub(r"^\s*\w+\s*=", "", line).strip(" []{};\t") for line in lines]
     mark = next((mark for mark in "\t;," if mark in plain[0]), None)
     rows = [split_heading(line.strip(f"{mark} "), mark)[0] if mark else line.split() for line in plain]
     full = rows[:-1] or rows  # the last line of a head is cut

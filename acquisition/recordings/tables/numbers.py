@@ -39,8 +39,8 @@ _MINUS = re.compile(
 )
 _POWER = re.compile(r"(?<=\d)[ \xa0]?(?:[×·][ \xa0]?10\^?|[اأ]س)(?=[-+\u2212\d])")
 _SPACE = re.compile(r"(?<!\d)[\xa0\u2007\u2009\u202f]|[\xa0\u2007\u2009\u202f](?!\d)")
-_MARKS = {0x66B: ".", 0x66C: "'", 0x60C: ",", 0x61B: ";", 0xFF0E: ".", 0xFF0C: ",", 0xFF1B: ";"}
-_NO_WIDTH = dict.fromkeys((0x200B, 0x200E, 0x200F, 0x61C))
+_MARKS = {0x60C: ",", 0x61B: ";", 0xFF0E: ".", 0xFF0C: ",", 0xFF1B: ";"}
+_ALWAYS = {0x66B: ".", 0x66C: "'", **dict.fromkeys((0x200B, 0x200E, 0x200F, 0x61C))}
 _LONGEST = 64  # bytes of a cell that are examined; longer cells are rare and are read one by one
 _DIGIT, _SIGN, _MARK, _E, _OTHER = 1, 2, 3, 4, 5
 _KINDS = np.full(256, _OTHER, np.uint8)
@@ -56,7 +56,7 @@ def plain(text: str) -> str:
         return text
     others = [each for each in set(text) if each > "\x7f"]
     digits = {ord(each): str(unicodedata.decimal(each)) for each in others if each.isdecimal()}
-    text = text.translate({**(_MARKS if digits else {}), **_NO_WIDTH, **digits})
+    text = text.translate({**(_MARKS if digits else {}), **_ALWAYS, **digits})
     return _MINUS.sub("-", _POWER.sub("e", _SPACE.sub(" ", text)))
 
 
