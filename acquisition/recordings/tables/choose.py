@@ -248,10 +248,12 @@ def _with_time_unit(path: str, table: Table, unit: str) -> Table:
         raise FormatError(path, f'time unit must be one of {", ".join(TIMES)}, got "{unit}"', "name one of these")
     if table.times is None:
         raise FormatError(path, f"time unit {unit} was given, but there is no column of times", "leave it out")
-    of_file = unit_words(table.times.unit)
+    times, of_file = table.times, unit_words(table.times.unit)
+    traps = table.traps
     if time_unit(of_file) is not None and of_file != unit_words(unit):
-        raise FormatError(path, f'time unit must be {of_file} as stated by the file, got "{unit}"', "leave it out")
-    return replace(table, times=replace(table.times, unit=unit))
+        message = f'you stated the unit {unit} for "{times.label}": the unit of the file is not used'
+        traps = (*traps, FormatIssue("unit_given", message))
+    return replace(table, times=replace(times, unit=unit), traps=traps)
 
 
 def _missing_times(

@@ -353,3 +353,11 @@ def test_jumps_by_a_turn_are_undone(tmp_path: Path, unit: str, turn: float, form
     steps = np.diff(true) * (np.pi / 180 if unit == "deg" else 1.0)
     np.testing.assert_allclose(np.diff(recording.samples.distance), steps, atol=turn * 1e-4)
     assert [each for each in recording.traps if each.code == "values_unwrapped"]
+
+
+def test_a_stated_unit_of_times_beats_the_heading(tmp_path: Path) -> None:
+    """It is used and noted."""
+    text = table([f"{1000 * t:.0f}" for t in T], [f"{x:.3f}" for x in X])
+    recording = read(tmp_path, text, time_unit="ms")
+    holds(recording)
+    assert [each for each in recording.traps if each.code == "unit_given"]
