@@ -13,8 +13,8 @@ from acquisition.block import F8
 from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.sampling.timing import Formula
 from acquisition.recordings.tables.headings import Heading, heading_of, is_time, is_uncertainty, split_heading
+from acquisition.recordings.tables.numbers import THOUSANDS, is_lost, parse_number
 from acquisition.recordings.tables.numbers import cell as number_form
-from acquisition.recordings.tables.numbers import is_lost, parse_number
 from acquisition.recordings.tables.table import Header
 from acquisition.recordings.tables.times import in_order, is_newest_first, is_time_cell
 from acquisition.recordings.tables.vocabulary import INDEX, NEUTRAL, NUMBERED, SPAN
@@ -85,7 +85,9 @@ def _split_by(lines: Sequence[str], mark: str) -> Header | None:
     """Find the first rows of numbers in lines with a separator; None if there are none."""
     filled = [at for at, each in enumerate(lines) if each.strip(mark + " " if mark else "\t ")]
     cells = [_cells(lines[at], mark) for at in filled]
-    kinds = [[_kind(cell) for cell in row] for row in cells]
+    kinds = [
+        ["number" if mark and THOUSANDS.fullmatch(cell.encode()) else _kind(cell) for cell in row] for row in cells
+    ]
     for at, first in enumerate(kinds):
         if not _is_row(first) or cells[at][0] == "-" or any("=" in cell for cell in cells[at]):
             continue  # "- 0.5" is a list of YAML

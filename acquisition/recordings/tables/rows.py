@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import zip_longest
@@ -12,7 +11,16 @@ import numpy as np
 from acquisition.block import B1, F8
 from acquisition.errors import FormatError
 from acquisition.recordings.recording import FormatIssue
-from acquisition.recordings.tables.numbers import EMPTY_CELL, EXPONENT, I1, UNREAD_CELL, is_cut, read_cells, split_page
+from acquisition.recordings.tables.numbers import (
+    EMPTY_CELL,
+    EXPONENT,
+    I1,
+    THOUSANDS,
+    UNREAD_CELL,
+    is_cut,
+    read_cells,
+    split_page,
+)
 from acquisition.recordings.tables.table import Column, Lines, Table
 from acquisition.recordings.tables.text import Text, decode
 from acquisition.recordings.tables.times import clock_times
@@ -20,7 +28,6 @@ from acquisition.recordings.tables.times import clock_times
 _MOST_EMPTY = 4_000_000
 """Cells that rows may lack, in addition to one for every byte, before the table counts as damaged."""
 _REMEDY = "export the numbers without thousands separators"
-_THOUSANDS = re.compile(rb"[-+]?[1-9]\d{0,2}((?:[,. ']|\xc2?\xa0|\xe2\x80[\xaf\x99])\d{3})+([.,]\d*)?")
 
 
 def read_rows(
@@ -58,7 +65,7 @@ def read_rows(
                 cells_of[at] += [b""] * (count - len(cells_of[at])) + list(cells)
             sizes[at] = count + len(rows)
             for row in np.flatnonzero(pieces[at][-1][1] == UNREAD_CELL).tolist() if mark else ():
-                if _THOUSANDS.fullmatch(cells[row]):
+                if THOUSANDS.fullmatch(cells[row]):
                     shown = cells[row].decode("utf-8", "replace")
                     problem = f'expected plain numbers, got a thousands separator in "{shown}"'
                     raise FormatError(path, problem, _REMEDY)
