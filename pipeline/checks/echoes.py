@@ -44,7 +44,7 @@ def echoes_by_chance(before: U8, demodulated: Demodulated) -> bool:
     if np.any(before & echo):
         return False
     rows = np.flatnonzero(demodulated.flags & echo)
-    n = int(np.count_nonzero((demodulated.flags & UNUSABLE) == 0)) + rows.size
+    n = int(np.count_nonzero(demodulated.used)) + rows.size
     farthest = float(np.max(np.abs(demodulated.residual[rows]), initial=0.0))
     expected = 2.0 * n * 2.0 * float(ndtr(-CLIP_SIGMAS))
     return bool(
@@ -71,7 +71,7 @@ def find_clusters(track: Track, demodulated: Demodulated, phase: Phase) -> dict[
         return {}
     angle = phase.total(track.t[rows])
     middles = angle[(starts + sizes // 2)[clusters]]
-    fitted = int(np.count_nonzero((demodulated.flags & UNUSABLE) == 0)) + rows.size
+    fitted = int(np.count_nonzero(demodulated.used)) + rows.size
     residual = demodulated.residual[rows]
     residual[~np.isfinite(residual)] = 0.0
     return {

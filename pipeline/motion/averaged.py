@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
+from typing import Literal
 
 import numpy as np
 
@@ -29,7 +30,7 @@ from pipeline.numerics.regression import (
     smooth_curve,
     solve_weighted,
 )
-from pipeline.track import F8, UNUSABLE
+from pipeline.track import F8
 from pipeline.windows.cycles import NoOscillation
 from pipeline.windows.demodulate import ROUNDING, Demodulated
 from pipeline.windows.disturbances import Disturbances
@@ -110,6 +111,10 @@ class Waveform:
         return self.moving()
 
 
+Method = Literal["windows", "samples", "equation"]
+"""What the motion was fitted to."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Fitted:
     """An oscillation in the form that the stages after the fit use."""
@@ -120,7 +125,7 @@ class Fitted:
     phase: Phase
     rest: Rest
     waveform: Waveform  # including the disturbances
-    method: str  # "windows", "samples" or "equation"
+    method: Method
     why: str  # what a method that failed, or the equation of motion, came to
 
     def first_shift(self, kappa: float) -> tuple[float, float]:
@@ -185,19 +190,19 @@ class Averaged:
 def fit_windows(windows: Demodulated, disturbances: Disturbances, damping: Damping) -> Fitted:
     """Fit phase and rest position to the windows, whose amplitudes gave the laws."""
     samples = disturbances.conditioned
-    track, flags = samples.track, windows.flags
-    last = float(np.max(track.t, where=(flags & UNUSABLE) == 0, initial=-np.inf))
+    track = samples.track
+    last = float(np.max(track.t, where=windows.used, initial=-np.inf))
     phase = fit_phase(windows, damping, last)
     rest = fit_rest(windows, track.unit)
     return assembled(windows, disturbances, damping, phase, rest, "windows")
 
 
 def assembled(
-    windows: Demodulated, disturbances: Disturbances, damping: Damping, phase: Phase, rest: Rest, method: str
+    windows: Demodulated, disturbances: Disturbances, damping: Damping, phase: Phase, rest: Rest, method: Method
 ) -> Fitted:
     """Return the fitted oscillation with its waveform: rest position, amplitude and phase at every sample."""
     track = disturbances.conditioned.track
-    used = (windows.flags & UNUSABLE) == 0
+    used = windows.used
     # A law is valid only where it was fitted: before the first and after the last sample used it is held constant.
     last = float(np.max(track.t, where=used, initial=-np.inf))
     best = damping.best

@@ -116,7 +116,7 @@ def _rows(fitted: Fitted, samples: Conditioned, level: float) -> Rows:
     free, flags = fitted.disturbances.conditioned, fitted.demodulated.flags
     track = free.track
     known = np.isfinite(track.y) & np.isfinite(track.t)
-    usable = (free.flags & UNUSABLE) == 0
+    usable = free.used
     echo = (flags & np.uint8(Quality.FALSE_ECHO)) != 0
     # Samples excluded by a window's narrow spread or a neighbouring spike may return; those in clusters may not.
     run = np.convolve(echo, np.ones(3), "same") == 3
@@ -130,7 +130,7 @@ def _rows(fitted: Fitted, samples: Conditioned, level: float) -> Rows:
     def near_plateau(position: F8) -> Bools:
         return free.near_plateau(level + position, fitted.demodulated.noise_m)
 
-    used = usable & ((flags & UNUSABLE) == 0)
+    used = usable & fitted.demodulated.used
     return Rows(t, y, candidates, used, 1.0, columns if columns.size else None, near_plateau)
 
 

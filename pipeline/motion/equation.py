@@ -32,7 +32,7 @@ from pipeline.numerics.quantity import amount
 from pipeline.numerics.regression import correlation_length
 from pipeline.samples.condition import Conditioned
 from pipeline.samples.stopping import stop_row
-from pipeline.track import F8, UNUSABLE
+from pipeline.track import F8
 from pipeline.windows.demodulate import Demodulated
 from pipeline.windows.disturbances import Disturbances
 
@@ -280,10 +280,9 @@ def _rows(samples: Conditioned, windows: Demodulated, damping: Damping) -> Rows:
     within = used & (np.arange(track.t.size) < (track.t.size if stop is None else stop))
     last, first = float(np.max(track.t[used])), damping.t0
     t = np.clip(np.where(np.isfinite(track.t), track.t, first), first, last) - first
-    quantum = (samples.quantum_m or 0.0) / math.sqrt(12.0)
-    expected_m = max(samples.noise_m, quantum, 1e-9 * abs(float(damping.best.joint.values[0])))
+    expected_m = max(samples.noise_of_reading_m, 1e-9 * abs(float(damping.best.joint.values[0])))
     # False echoes of the windows that the solution explains return later.
-    used_first = within & ((windows.flags & UNUSABLE) == 0)
+    used_first = within & windows.used
     return Rows(t, track.y, within, used_first, expected_m, None, partial(samples.near_plateau, noise_m=expected_m))
 
 

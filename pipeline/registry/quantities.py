@@ -78,6 +78,20 @@ _QUANTITIES = (
 QUANTITIES: Mapping[str, Quantity] = {quantity.name: quantity for quantity in _QUANTITIES}
 """All estimates by name, in the order of Table 1."""
 
+MADE_OF: Mapping[str, frozenset[str]] = {
+    part: frozenset(names.split())
+    for part, names in {
+        "times": "period period_small_swings first_mode_period second_mode_period frequency angular_frequency "
+        "spring_constant gravity damping_rate relaxation_rate relaxation_rate_slow relaxation_rate_fast velocity_rms "
+        "reynolds_number reynolds_number_start gamma beta mu c",
+        "frequency": "reynolds_number reynolds_number_start",
+        "distances": "first_mode_amplitude second_mode_amplitude gravity amplitude displacement_amplitude offset noise "
+        "velocity_rms reynolds_number reynolds_number_start keulegan_carpenter_number drag_coefficient beta mu c",
+        "scene": "spring_constant reynolds_number reynolds_number_start keulegan_carpenter_number drag_coefficient",
+    }.items()
+}
+"""What estimates are computed of, as ``about`` of a finding names what it concerns."""
+
 INPUTS: Mapping[str, Input] = {
     # Inputs estimated from the recording.
     "angular_frequency": Input("scatter of the phases", "omega", "rad/s"),

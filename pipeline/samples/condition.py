@@ -68,6 +68,11 @@ class Conditioned:
         mask: NDArray[np.bool_] = (self.flags & UNUSABLE) == 0
         return mask
 
+    @property
+    def noise_of_reading_m(self) -> float:
+        """The noise of one sample, at least that of rounding to the resolution, in the record's unit."""
+        return max(self.noise_m, (self.quantum_m or 0.0) / math.sqrt(12.0))
+
     def less(self, taken_m: F8) -> Conditioned:
         """Return the record with values (n,) subtracted from its distances; flags and times are kept."""
         return replace(self, track=replace(self.track, y=self.track.y - taken_m))

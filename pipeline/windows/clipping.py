@@ -81,7 +81,7 @@ def find_cuts(conditioned: Conditioned, cycles: Cycles, demodulated: Demodulated
     """
     # A record whose crests are flat may show no noise at all.
     rounding_m = ROUNDING * float(np.max(np.abs(demodulated.amplitude)))
-    least_m = max(conditioned.noise_m, (conditioned.quantum_m or 0.0) / math.sqrt(12.0), rounding_m)
+    least_m = max(conditioned.noise_of_reading_m, rounding_m)
     unexplained = _of_windows(Windows.cut(conditioned, cycles.bounds), demodulated)
     if not any(_cut_windows(unexplained, sign, least_m) for sign in (1.0, -1.0)):
         return None

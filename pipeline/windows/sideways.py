@@ -22,7 +22,7 @@ from pipeline.numerics.spectrum import (
     worth_a_look,
 )
 from pipeline.samples.condition import Conditioned
-from pipeline.track import F8, UNUSABLE
+from pipeline.track import F8
 from pipeline.windows.demodulate import Demodulated
 from pipeline.windows.modes import C16, Carrier, Mode, Sideways
 
@@ -47,7 +47,7 @@ def find_sideways(conditioned: Conditioned, demodulated: Demodulated) -> Sideway
     A mode within a few reciprocals of the record's length of the main frequency is not searched for. It beats too
     slowly to be distinguished from a change of the amplitude.
     """
-    used = (demodulated.flags & UNUSABLE) == 0
+    used = demodulated.used
     t = conditioned.track.t[used]
     if demodulated.t.size < LEAST_WINDOWS:
         return Sideways((), None)

@@ -110,7 +110,7 @@ def _run(row: Mapping[str, Any], bench: str, *, alone: bool) -> CourseRun:
         unit=row.get("unit") or "",
         on_spring=on_spring,
         spring_mass_kg=spring,
-        implausible="; ".join(Scene(bob_mass_kg=bob).unusual()),
+        implausible="; ".join(f"{clause}{mark}" for clause, mark in Scene(bob_mass_kg=bob).unusual()),
     )
 
 

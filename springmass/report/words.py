@@ -9,7 +9,6 @@ from pipeline.damping.laws import words_of
 from pipeline.numerics.quantity import noun
 from pipeline.registry.quantities import INPUTS
 from pipeline.results.budget import Contribution
-from pipeline.track import UNUSABLE
 from springmass.result.advice import harm_of, sentence, trust_of, trust_text
 from springmass.result.budget_tables import budgets_of
 from springmass.result.table1 import is_about
@@ -60,7 +59,7 @@ def damping_sentence(analysis: Analysis) -> str:
         return ""
     damping, quoted = analysis.motion.damping, analysis.motion.derived.quoted
     chosen = words_of(damping.best.law)
-    used = analysis.track.t[(analysis.flags & UNUSABLE) == 0]
+    used = analysis.track.t[analysis.used]
     span = f"{float(used.max() - used.min()):.0f} s"
     if damping.best.rejected and damping.by_statement:
         return (

@@ -10,8 +10,7 @@ from typing import Any, Literal, get_args
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.findings.finding import kinds
 from pipeline.numerics.estimate import Estimate, UpperLimit
-from pipeline.numerics.quantity import Unit, exponents_of
-from pipeline.registry.quantities import INPUTS, QUANTITIES
+from pipeline.registry.quantities import INPUTS, MADE_OF, QUANTITIES
 from springmass.result.table1 import table_estimates, table_rows
 from springmass.typeset import typeset
 
@@ -100,15 +99,6 @@ Grade = Literal["sound", "uncertain", "do not quote"]
 GRADES: tuple[Grade, ...] = get_args(Grade)
 UNCERTAIN = 0.05  # u over the value from which fewer than two digits are certain
 MEANINGLESS = 0.5  # u over the value from which zero is within two standard uncertainties
-_PARTS = frozenset({"times", "frequency", "distances", "scene"})
-_NOT_BY_UNIT = {
-    "spring_constant": {"scene"},
-    "reynolds_number": _PARTS,
-    "reynolds_number_start": _PARTS,
-    "keulegan_carpenter_number": {"distances", "scene"},
-    "drag_coefficient": {"distances", "scene"},
-}
-"""What a quantity is computed of beside what its unit shows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,22 +135,14 @@ def trust_of(analysis: Analysis) -> dict[str, Trust]:
 
 def _assumed(motion: Oscillation, analysis: Analysis, name: str) -> Iterator[Trust]:
     """Yield the errors, the unchecked assumptions and the averages on which a quantity depends."""
-    parts = _made_of(name)
+    parts = {part for part, names in MADE_OF.items() if name in names}
     if any(each.name == "angular_frequency" for each in motion.derived.budgets[name].contributions):
         parts.add("frequency")
     for finding in analysis.findings:
-        harm, concerned = harm_of(finding.code, finding.severity), _PARTS & {*kinds()[finding.code].about}
+        harm, concerned = harm_of(finding.code, finding.severity), MADE_OF.keys() & {*kinds()[finding.code].about}
         averaged = abs(finding.values.get("relative_shift", 0.0)) > UNCERTAIN
         if (averaged or harm in (Harm.UNUSABLE, Harm.SCALE)) and (not concerned or concerned & parts):
             yield Trust("do not quote" if harm is Harm.UNUSABLE else "uncertain", finding.code)
-
-
-def _made_of(name: str) -> set[str]:
-    """Return what a quantity is computed of: times, distances, the scene."""
-    unit = QUANTITIES[name].unit
-    powers = (0.0, 1.0, unit.second) if isinstance(unit, Unit) else exponents_of(unit) or ()
-    parts = {part for part, power in zip(("masses", "distances", "times"), powers, strict=False) if power}
-    return {*parts, *_NOT_BY_UNIT.get(name, ())}
 
 
 def _sized(motion: Oscillation, name: str, x: Estimate) -> Iterator[Trust]:

@@ -14,7 +14,7 @@ from pipeline.analysis import Analysis
 from pipeline.dynamics import Problem
 from pipeline.dynamics.band import C16, Band
 from pipeline.numerics.estimate import Estimate
-from pipeline.track import F8, UNUSABLE
+from pipeline.track import F8
 from springmass.simulations.from_run import oscillation_of
 from springmass.simulations.simulation import FINE, count_of, solve
 
@@ -90,8 +90,8 @@ def compare_with_run(
         step_s = min(step_s, 1.0 / (FINE * problem.equation.angular_frequency_per_s))
     count = count_of(step_s * max(1, math.ceil(duration_s(analysis) / step_s)), step_s)
     trajectory = solve(problem, method, step_s, count, tolerance).trajectory
-    rest, good = motion.rest.at(t), (analysis.flags[used] & UNUSABLE) == 0
-    free = tuple(each[good] for each in (t - t[0], measured - rest, motion.waveform.velocity[used]))
+    rest, good = motion.rest.at(t), analysis.used[used]
+    free = (t - t[0])[good], (measured - rest)[good], motion.waveform.velocity[used][good]
     predicted: F8 = rest + trajectory.at(t - t[0])
     rms = float(np.sqrt(np.mean((measured - predicted) ** 2)))
     noise = analysis.estimates["noise"].value
