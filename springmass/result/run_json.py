@@ -43,15 +43,16 @@ def result_of(
     The estimates of ``classic``, if it is given, replace those of the analysis.
     """
     estimates = classic.estimates if classic is not None else analysis.estimates
+    motion = analysis.motion if classic is None and isinstance(analysis.motion, Oscillation) else None
     content = {
         "schema": RESULT_SCHEMA,
         "input": input_of(loaded),
         "recorded": _recorded(loaded),
         "quality": {**analysis.quality, "malformed_rows": loaded.recording.malformed_rows},
         "estimates": estimates,
-        "budget": _budgets(analysis) if classic is None else {},
-        "correlations": _correlations(analysis, wanted=classic is None),
-        "damping": _damping(analysis, wanted=classic is None),
+        "budget": {} if motion is None else _budgets(motion),
+        "correlations": _NO_CORRELATIONS if motion is None else _correlations(motion),
+        "damping": _NO_DAMPING if motion is None else _damping(motion),
         "effects": analysis.effects,
         "findings": analysis.findings,
         "provenance": provenance_of(accuracy, parameters, time_utc),
@@ -112,16 +113,25 @@ def _sentence(clause: str) -> str:
     return (clause[0].upper() + clause[1:] if first.isalpha() else clause) + end
 
 
-def _budgets(analysis: Analysis) -> dict[str, Any]:
-    if not isinstance(analysis.motion, Oscillation):
-        return {}
+_NO_CORRELATIONS: dict[str, Any] = {"names": [], "matrix": []}
+_NO_DAMPING: dict[str, Any] = {
+    **dict.fromkeys(("selected", "stated", "law")),
+    "admissible": [],
+    "weights": {},
+    "of_law": [],
+    "coefficients": {},
+    "laws": {},
+}
+
+
+def _budgets(motion: Oscillation) -> dict[str, Any]:
     return {
         name: {
             **plain(budget.estimate),
             **plain(picked(budget, EXPANDED)),
             "inputs": [_contribution(c) for c in budget.contributions],
         }
-        for name, budget in analysis.motion.derived.budgets.items()
+        for name, budget in motion.derived.budgets.items()
     }
 
 
@@ -131,18 +141,13 @@ def _contribution(c: Contribution) -> dict[str, Any]:
     return {"name": c.name, "type": c.kind, **given, **numbers}
 
 
-def _correlations(analysis: Analysis, *, wanted: bool) -> dict[str, Any]:
-    if not wanted or not isinstance(analysis.motion, Oscillation):
-        return {"names": [], "matrix": []}
-    joint = analysis.motion.derived.joint
+def _correlations(motion: Oscillation) -> dict[str, Any]:
+    joint = motion.derived.joint
     return {"names": joint.names, "matrix": joint.correlation.round(6)}
 
 
-def _damping(analysis: Analysis, *, wanted: bool) -> dict[str, Any]:
-    if not wanted or not isinstance(analysis.motion, Oscillation):
-        none = dict.fromkeys(("selected", "stated", "law"))
-        return {**none, "admissible": [], "weights": {}, "of_law": [], "coefficients": {}, "laws": {}}
-    damping, derived = analysis.motion.damping, analysis.motion.derived
+def _damping(motion: Oscillation) -> dict[str, Any]:
+    damping, derived = motion.damping, motion.derived
     keys, coefficients = ("reduced_chi2", "dof", "bic", "rejected"), parameters_json(derived.coefficients)
     laws = {
         name: {"parameters": parameters_json(derived.parameters_of(fit)), **picked(fit, keys)}
