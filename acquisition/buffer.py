@@ -1,4 +1,4 @@
-"""Buffers for samples that arrive piece by piece."""
+"""A buffer for samples that arrive piece by piece."""
 
 from __future__ import annotations
 
@@ -7,24 +7,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from acquisition.block import Block
-
 
 class GrowingColumns:
     """Columns of numbers that grow together; the room doubles, so that the cost per row stays constant.
 
-    Rows that were handed out never change, and one thread may read them while another appends.
+    ``total`` counts the rows that came. Rows that were handed out never change, so one thread may read while another
+    appends, but not while it keeps only some rows.
     """
 
     def __init__(self, *kinds: DTypeLike) -> None:
         self._columns: list[NDArray[Any]] = [np.empty(1024, kind) for kind in kinds]
-        self._count = 0
+        self._count = self.total = 0
 
     def __len__(self) -> int:
         return self._count
 
     def __getitem__(self, rows: slice) -> list[NDArray[Any]]:
-        """Return some rows of each column."""
         count = self._count
         return [column[:count][rows] for column in self._columns]
 
@@ -36,30 +34,9 @@ class GrowingColumns:
             self._columns = [np.concatenate([c[: self._count], np.empty(room, c.dtype)]) for c in self._columns]
         for column, new in zip(self._columns, (t, *others), strict=True):
             column[self._count : stop] = new
-        self._count = stop  # last, because another thread may read
+        self._count, self.total = stop, self.total + t.size  # last, because another thread may read
 
     def keep(self, rows: slice) -> None:
-        """Keep only some rows, in new arrays; no other thread may read meanwhile."""
+        """Keep only some rows, in new arrays."""
         self._columns = [column.copy() for column in self[rows]]
         self._count = self._columns[0].size
-
-
-class SampleBuffer(GrowingColumns):
-    """The samples of one sensor so far, or only the latest ``most``; ``pushed`` is the number of all that came."""
-
-    def __init__(self, most: int | None = None) -> None:
-        super().__init__(float, float, np.uint8, np.int64)
-        self._most = most
-        self.pushed = 0
-
-    def push(self, block: Block) -> None:
-        """Append samples; without host times, these are -1."""
-        self.append(block.t, block.distance, block.flags, -1 if block.host_ns is None else block.host_ns)
-        if self._most is not None and len(self) > 2 * self._most:
-            self.keep(slice(-self._most, None))
-        self.pushed += len(block)
-
-    def block(self) -> Block:
-        """Return the samples as they are now."""
-        t, distance, flags, host_ns = self[slice(None if self._most is None else -self._most, None)]
-        return Block(0, t, distance, flags, host_ns)

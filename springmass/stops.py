@@ -42,14 +42,12 @@ class Stops:
 
     It runs while ``by`` is None. It ends, for the reason ``by``, after the first signal or a request of the page: the
     signal raises KeyboardInterrupt within :meth:`raising`, or waits for its next context. It leaves at the second
-    signal, on a thread, because the main thread may wait for a disk: it calls ``leaving`` and prints ``last_words``,
-    which must not wait for a disk.
+    signal, on a thread, because the main thread may wait for a disk.
     """
 
     def __init__(self) -> None:
         self.by: EndReason | None = None
-        self.last_words: Callable[[], str] = lambda: "stopped immediately"
-        self.leaving: list[Callable[[], object]] = []
+        self._steps: list[Callable[[], str | None]] = []
         self._raises = self._answered = False  # whether signals raise now, and whether one was answered
         self._before: dict[int, object] = {}
 
@@ -94,6 +92,15 @@ class Stops:
         finally:
             self._raises = before
 
+    @contextlib.contextmanager
+    def leaving(self, step: Callable[[], str | None]) -> Iterator[None]:
+        """Call a step if the program leaves in this context, and print its words; it must not wait for a disk."""
+        self._steps.append(step)
+        try:
+            yield
+        finally:
+            self._steps.remove(step)
+
     def ask(self, by: EndReason) -> None:
         """End the recording at its next wait; any thread may ask."""
         self.by = self.by or by
@@ -126,9 +133,8 @@ class Stops:
 
     def _leave(self) -> None:
         try:
-            for step in self.leaving:
-                step()
-            line, stderr = f"springmass: {visible(self.last_words())}\n", sys.stderr.fileno()
+            words = [said for step in self._steps if (said := step())] or ["stopped immediately"]
+            line, stderr = f"springmass: {visible(words[0])}\n", sys.stderr.fileno()
             if os.isatty(stderr):
                 line = f"\r\n\x1b[?25h{line}"  # with the cursor that a display has hidden
             if os.name == "nt" or select.select([], [stderr], [], 0.0)[1]:  # otherwise nobody reads, and a write waits

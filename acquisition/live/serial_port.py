@@ -99,7 +99,7 @@ class SerialPort:
             raise PortError(f"{self.name}: cannot be opened ({error})") from error
         self._port = port
         self._descriptor = _descriptor(port)
-        _claim(self._descriptor)
+        _ask_terminal(self._descriptor, "TIOCEXCL")
         _keep_alive(port)
 
     def read(self, wait_s: float) -> bytes:
@@ -145,7 +145,7 @@ class SerialPort:
         port, descriptor = self._port, self._descriptor
         self._port, self._descriptor = None, -1
         if port is not None:
-            _claim(descriptor, release=True)
+            _ask_terminal(descriptor, "TIOCNXCL")
             with contextlib.suppress(OSError):  # a disconnected device has nothing to release
                 port.close()
 
@@ -172,11 +172,11 @@ def _devices() -> dict[str, _Device]:
     }
 
 
-def _claim(descriptor: int, *, release: bool = False) -> None:
-    """Keep other programs from opening a terminal device; the lock of pyserial stops only programs that check it."""
+def _ask_terminal(descriptor: int, request: str) -> None:
+    """Let only this program open a terminal device, or any: the lock of pyserial stops only those that check it."""
     if termios is not None and descriptor >= 0:
         with contextlib.suppress(OSError):  # the descriptor is a socket, or the device is disconnected
-            fcntl.ioctl(descriptor, termios.TIOCNXCL if release else termios.TIOCEXCL)
+            fcntl.ioctl(descriptor, getattr(termios, request))
 
 
 def _keep_alive(port: Any) -> None:

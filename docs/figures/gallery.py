@@ -5,24 +5,19 @@ from __future__ import annotations
 import io
 from dataclasses import replace
 from pathlib import Path
-from typing import cast
 
 from matplotlib.figure import Figure
 from PIL import Image
 
-from pipeline.bench.scene import Scene
-from pipeline.dynamics import effective_mass_kg
 from springmass import Run, sample_data
 from springmass.charts.chart import Chart, Panel
 from springmass.charts.draw import draw, style
 from springmass.charts.run import charts_of
 from springmass.loading.options import AnalysisOptions
 from springmass.simulations import charts
-from springmass.simulations.against import compare_with_run, duration_s
-from springmass.simulations.simulation import count_of, prepare, simulated
+from springmass.simulations.simulation import SimulationOptions, simulated
 
 HERE = Path(__file__).resolve().parent
-STEP_S = 0.01
 COLUMNS, WIDTH, HEIGHT = 3, 4.2, 3.0
 
 
@@ -31,12 +26,9 @@ def charts_of_run(name: str) -> dict[str, Chart]:
     data = sample_data()
     how = AnalysisOptions.of({"velocity": data / f"{name}_simulated_velocity.txt", "method": "classic"})
     run = Run.of(data / f"{name}_simulated_position.txt", data / f"{name}.scene.toml", how)
-    seconds = duration_s(run.analysis)
-    ready = prepare(cast(Scene, run.scene), seconds, analysis=run.analysis)
-    motion = simulated(ready.problem, "auto", STEP_S, count_of(seconds, STEP_S), None, check=False)
-    over = compare_with_run(run.analysis, ready.problem, "auto", STEP_S, None, None)
+    motion = simulated(run.scene, SimulationOptions(), run)
     own = charts_of(run.analysis, (), run.classic)
-    return own | {f"by {c.name}": c for c in charts.simulation(motion, effective_mass_kg(ready.solved), over)}
+    return own | {f"by {c.name}": c for c in charts.simulation(motion)}
 
 
 def panels() -> list[tuple[str, Panel]]:

@@ -16,13 +16,12 @@ from pipeline.checks.rounding import rounding
 from pipeline.checks.sensor import held, smoothed
 from pipeline.checks.shape import folded_shape
 from pipeline.motion.averaged import Fitted
-from pipeline.numerics.levels import FALSE_ALARM
 from pipeline.registry.found import Found
 from pipeline.samples.condition import Conditioned
 from pipeline.windows.lost_rows import LostRows
 
-# The tests of the residual in order. Those that decide by a probability alone get an equal share of FALSE_ALARM.
-TESTS: tuple[Callable[[Residual, float], Outcome | None], ...] = (
+# The tests of the residual in order.
+TESTS: tuple[Callable[[Residual], Outcome | None], ...] = (
     folded_shape,
     held,
     smoothed,
@@ -48,7 +47,7 @@ def judge(
     if fitted.method != "equation":
         residual = residual_of(samples, fitted, filter_)
         for test in TESTS:
-            if (outcome := test(residual, FALSE_ALARM / len(TESTS))) is not None:
+            if (outcome := test(residual)) is not None:
                 outcomes.append(outcome)
                 residual = residual.less(outcome)
     numbers: dict[str, dict[str, float | str | None]] = {}

@@ -7,13 +7,15 @@ import math
 import numpy as np
 
 from pipeline.checks.residual import Outcome, Residual
-from pipeline.numerics.levels import FEWEST_FOR_CURVE, MISFIT, NOTICEABLE, normal_quantile
+from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_CURVE, MISFIT, NOTICEABLE, normal_quantile
 from pipeline.numerics.regression import chi2_quantile
 from pipeline.track import F8
 from pipeline.windows.demodulate import ROUNDING
 
+ALARM_OF_A_TEST = FALSE_ALARM / 3.0  # probability of a false alarm of each of the three tests that decide by one alone
 
-def excess(residual: Residual, _: float) -> Outcome | None:
+
+def excess(residual: Residual) -> Outcome | None:
     """Test whether the part that the whole model does not describe is larger than the noise within a period."""
     rms_m, noise_m = residual.fitted.waveform.rms_m, residual.noise_m
     if rms_m > MISFIT * max(noise_m, residual.rounding_m):
@@ -21,17 +23,17 @@ def excess(residual: Residual, _: float) -> Outcome | None:
     return None
 
 
-def phases(residual: Residual, false_alarm: float) -> Outcome | None:
+def phases(residual: Residual) -> Outcome | None:
     """Test whether the phases scatter as their noise predicts."""
     phase = residual.fitted.phase
     free = (phase.residual.size - phase.coefficients.size) / phase.correlation
-    if free >= 1.0 and phase.reduced_chi2 > chi2_quantile(1.0 - false_alarm, free) / free:
+    if free >= 1.0 and phase.reduced_chi2 > chi2_quantile(1.0 - ALARM_OF_A_TEST, free) / free:
         chi2 = phase.reduced_chi2
         return Outcome("model_misfit", {"phase_chi2": chi2, "phase_scatter": math.sqrt(chi2)})
     return None
 
 
-def halves(residual: Residual, false_alarm: float) -> Outcome | None:
+def halves(residual: Residual) -> Outcome | None:
     """Test whether both halves of the run agree with one model.
 
     The residuals of amplitudes and phases, over their standard uncertainties, are fitted by a straight line in each
@@ -51,10 +53,10 @@ def halves(residual: Residual, false_alarm: float) -> Outcome | None:
         change = part[-half:] - part[:half]
         level, slope = abs(float(change.sum())) / math.sqrt(half), abs(float(x @ change)) / math.sqrt(float(x @ x))
         apart = max(apart, level / math.sqrt(2.0), slope / math.sqrt(2.0))
-    return Outcome("model_misfit", {"halves": apart}) if apart > normal_quantile(1.0 - false_alarm / 4.0) else None
+    return Outcome("model_misfit", {"halves": apart}) if apart > normal_quantile(1.0 - ALARM_OF_A_TEST / 4.0) else None
 
 
-def colour(residual: Residual, false_alarm: float) -> Outcome | None:
+def colour(residual: Residual) -> Outcome | None:
     """Test whether more than half of the residual that no other test explains can be predicted from another sample.
 
     The correlations of n samples of white noise have a standard deviation of :math:`n^{-1/2}`. With the probability
@@ -80,7 +82,7 @@ def colour(residual: Residual, false_alarm: float) -> Outcome | None:
     enough = pairs > 0.25 * pairs[0]
     correlation = np.where(enough, sums / np.maximum(pairs, 1.0), 0.0) / (sums[0] / pairs[0])
     lag = first + int(np.argmax(np.abs(correlation[first:])))
-    white = normal_quantile(1.0 - false_alarm / lags) / math.sqrt(pairs[lag] or 1.0)
+    white = normal_quantile(1.0 - ALARM_OF_A_TEST / lags) / math.sqrt(pairs[lag] or 1.0)
     # With fewer pairs than samples the estimate may exceed 1, which a correlation cannot.
     strongest = max(-1.0, min(float(correlation[lag]), 1.0))
     predictable_m = math.sqrt(abs(strongest) * sums[0] / pairs[0])

@@ -50,7 +50,7 @@ def held_numbers(count: int, step_s: float) -> dict[str, float | None]:
     return {"count": count, "interval_s": count * step_s, "late_s": 0.5 * step_s * (count - 1)}
 
 
-def held(residual: Residual, _: float) -> Outcome | None:
+def held(residual: Residual) -> Outcome | None:
     """Test for readings that are held over N samples, or joined by straight lines.
 
     Holding acts as one running mean over N samples, joining as two without delay.
@@ -77,7 +77,7 @@ def held(residual: Residual, _: float) -> Outcome | None:
     return Outcome("held_samples", held_numbers(repeats, residual.step_s), misfit, lags=math.inf)
 
 
-def smoothed(residual: Residual, _: float) -> Outcome | None:
+def smoothed(residual: Residual) -> Outcome | None:
     """Test how far neighbouring samples are alike; None if that affects no result.
 
     A running mean over N samples correlates white noise over N samples, :math:`1 + 2\\sum\\rho_l = N`, takes

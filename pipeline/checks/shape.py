@@ -21,7 +21,7 @@ REPORTED = 0.002
 CENTRES = math.tau * np.arange(BINS) / BINS + math.pi / BINS
 
 
-def folded_shape(residual: Residual, _: float) -> Outcome | None:
+def folded_shape(residual: Residual) -> Outcome | None:
     """Test for a wave that has the same shape in every period.
 
     The fit of every window removes the constant and the first harmonic. So the residuals contain the harmonics from the

@@ -29,7 +29,7 @@ from pipeline.numerics.levels import FEWEST_FOR_CURVE, MISFIT, STRONG, VERY_STRO
 from pipeline.numerics.quantity import noun
 from pipeline.numerics.regression import covariance_of
 from pipeline.samples.condition import Conditioned
-from pipeline.track import F8
+from pipeline.track import F8, Track
 from pipeline.windows.cycles import NoOscillation
 
 FAR = 20.0  # maximum change of the logarithm of a rate in the fit of a single exponential
@@ -278,7 +278,7 @@ def _follow(t: F8, y: F8, noise: float, samples: Conditioned) -> Overdamped | No
     found = replace(found, covariance=found.covariance * max(1.0, found.chi2 / max(t.size - 5, 1)))
     spread = math.sqrt(found.chi2 / max(t.size - 5, 1)) * noise
     noise_found = Estimate(spread, spread / math.sqrt(2.0 * t.size), track.unit)
-    result = _classified(found, kind, float(t[0]), noise_found, track.unit)
+    result = _classified(found, kind, float(t[0]), noise_found, track)
     return None if kind == "strong" and result.damping_ratio.value < LEAST_DAMPING else result
 
 
@@ -347,10 +347,11 @@ def _kind(rows: Rows, fit: Decay, fastest: float, unit: str) -> tuple[Kind, Deca
     return ("overdamped" if fit.square > 0.0 else "strong"), fit
 
 
-def _classified(fit: Decay, kind: Kind, start_s: float, noise: Estimate, unit: str) -> Overdamped:
+def _classified(fit: Decay, kind: Kind, start_s: float, noise: Estimate, track: Track) -> Overdamped:
     from uncertainties import correlated_values, ufloat, umath
 
-    clock = ufloat(1.0, U_CRYSTAL)  # the tolerance of a crystal is assumed for every clock
+    unit = track.unit
+    clock = ufloat(1.0, math.hypot(U_CRYSTAL, track.u_rate))  # the tolerance of a crystal is assumed for every clock
     offset, a, v, *logarithms = correlated_values(fit.values, fit.covariance)
     v, rate = v * clock, umath.exp(logarithms[0]) * clock
     stiffness = rate**2 if fit.critical else umath.exp(logarithms[1]) * clock**2

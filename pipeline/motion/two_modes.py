@@ -90,7 +90,7 @@ def find_two_modes(conditioned: Conditioned) -> TwoModes | None:
     results = {}
     for name, i, omega, size in zip(("first", "second"), places, omegas, sizes, strict=True):
         period = 2.0 * math.pi / omega
-        relative = math.hypot(float(u[i + 2]) / omega, U_CRYSTAL)
+        relative = math.hypot(float(u[i + 2]) / omega, U_CRYSTAL, conditioned.track.u_rate)
         results[f"{name}_mode_period"] = Estimate(period, period * relative, "s")
         results[f"{name}_mode_amplitude"] = Estimate(scale * size, scale * float(np.max(u[i : i + 2])), unit)
     descriptions = [

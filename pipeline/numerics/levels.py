@@ -48,6 +48,17 @@ LIMIT = 0.95
 COVERAGE = 0.9545
 
 
+def coverage_factor(dof: float) -> float:
+    """Return the factor k of an expanded uncertainty: a quantile of Student's t (EA-4/02 M:2022, appendix E).
+
+    >>> round(coverage_factor(math.inf), 2), round(coverage_factor(1), 2)
+    (2.0, 13.97)
+    """
+    from scipy.special import stdtrit
+
+    return float(stdtrit(dof, 0.5 * (1.0 + COVERAGE))) if math.isfinite(dof) else normal_quantile(COVERAGE)
+
+
 @cache
 def normal_quantile(share: float) -> float:
     """Return the size below which a share of the absolute values of standard normal deviates lie.

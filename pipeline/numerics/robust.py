@@ -11,6 +11,10 @@ from pipeline.track import F8
 
 MAD_TO_SIGMA = 1.482602218505602  # 1 / Phi^-1(3/4): P. J. Rousseeuw, C. Croux, J. Am. Stat. Assoc. 88 (1993) 1273
 
+# Relative standard uncertainty of that estimate from n normal deviates, times the root of n: its efficiency is 37 %
+# (the same source). It is also the relative change per share of outliers: 0.5/(2 phi(0.6745) 0.6745).
+U_OF_MAD = 1.17
+
 
 def median(x: NDArray[np.number[Any]]) -> float:
     """Return the median of (n,) numbers without NaN, for 160 values in a tenth of the time of ``numpy.median``."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate, Joint
-from pipeline.numerics.levels import COVERAGE
+from pipeline.numerics.levels import coverage_factor
 
 Kind = Literal["A", "B"]
 
@@ -55,10 +55,7 @@ class Budget:
     @property
     def coverage_factor(self) -> float:
         """Coverage factor k on u: quantile of Student's t for :attr:`dof` (EA-4/02 M:2022, appendix E)."""
-        from scipy.special import ndtri, stdtrit
-
-        tail, dof = 0.5 * (1.0 + COVERAGE), self.dof
-        return float(stdtrit(dof, tail) if math.isfinite(dof) else ndtri(tail))
+        return coverage_factor(self.dof)
 
     @property
     def expanded(self) -> float:

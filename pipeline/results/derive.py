@@ -25,7 +25,7 @@ from pipeline.damping.select import Damping
 from pipeline.motion.averaged import Fitted, Phase
 from pipeline.numerics.estimate import Estimate, Joint, UpperLimit
 from pipeline.numerics.levels import LIMIT
-from pipeline.numerics.robust import mad_sigma
+from pipeline.numerics.robust import U_OF_MAD, mad_sigma
 from pipeline.registry.quantities import QUANTITIES
 from pipeline.results.ambient import Ambient
 from pipeline.results.budget import Budget, Inputs, function_of, joint_of
@@ -454,9 +454,9 @@ def _masses(
 def _noise(demodulated: Demodulated, unit: str) -> Estimate:
     """Return the noise of one sample, from the median of the absolute residuals.
 
-    For a distribution with heavy tails, the standard deviation is a matter of definition. So the uncertainty includes
-    the difference to the root mean square of the samples used. It also includes the relative error of the median if a
-    share e of the samples are outliers like those left out: 0.5 e / (2 phi(0.6745) 0.6745) = 1.17 e.
+    For a distribution with heavy tails, the standard deviation is a matter of definition. So the uncertainty is no less
+    than the difference to the root mean square of the samples used. It also includes the relative error of the median
+    if a share e of the samples are outliers like those left out.
     """
     flags, residual = demodulated.flags, demodulated.residual
     clean = not flags.any()
@@ -469,5 +469,5 @@ def _noise(demodulated: Demodulated, unit: str) -> Estimate:
     dof = float(max(used - 3 * demodulated.count.size, demodulated.count.size))
     value = mad_sigma(residual) * math.sqrt(used / dof)
     wide = 0.0 if clean else np.count_nonzero(flags & np.uint8(Quality.FALSE_ECHO)) / flags.size
-    parts = (1.17 * value / math.sqrt(2.0 * dof), demodulated.noise_m - value, 1.17 * wide * value)
-    return Estimate(value, math.hypot(*parts), unit)
+    u = max(U_OF_MAD * value / math.sqrt(dof), abs(demodulated.noise_m - value))
+    return Estimate(value, math.hypot(u, U_OF_MAD * wide * value), unit)

@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.bench.spring import oscillating_mass_kg
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.levels import COVERAGE, NEGLIGIBLE, SIGNIFICANT, normal_quantile
+from pipeline.numerics.levels import NEGLIGIBLE, SIGNIFICANT, coverage_factor
 from pipeline.results.compare import SpringRun, shared_covariance, spring_line
 from pipeline.track import F8
 
@@ -72,13 +72,14 @@ class Hooke:
     """A spring constant by Hooke's law, :math:`y = y_0 \\pm (g/k) m`, with the points in kg and m and their line."""
 
     constant: Estimate
+    expanded: float  # expanded uncertainty of the constant, N/m; its scatter has n - 2 degrees of freedom
     mass_kg: F8
     position_m: F8
     line_m: F8
 
     def normalised_error(self, other: Estimate) -> float:
         """Return :math:`E_n = |k_1 - k_2| / \\sqrt{U_1^2 + U_2^2}`: at most 1 if two constants agree."""
-        expanded = normal_quantile(COVERAGE) * math.hypot(self.constant.u, other.u)
+        expanded = math.hypot(self.expanded, coverage_factor(math.inf) * other.u)
         return abs(self.constant.value - other.value) / expanded
 
 
@@ -92,7 +93,8 @@ def hooke(mass_kg: F8, position_m: F8) -> Hooke:
     u_slope = math.sqrt(float(np.sum((position_m - line) ** 2)) / (len(mass_kg) - 2) / float(np.sum(design[:, 1] ** 2)))
     if abs(slope) <= SIGNIFICANT * u_slope:
         raise AnalysisError("the positions do not follow the masses", "check the columns of the table")
-    k = GRAVITY.value / abs(slope)
-    return Hooke(
-        Estimate(k, k * math.hypot(u_slope / slope, GRAVITY.u / GRAVITY.value), "N/m"), mass_kg, position_m, line
-    )
+    k, u = GRAVITY.value / abs(slope), np.array([u_slope / slope, GRAVITY.u / GRAVITY.value])
+    # Both parts are expanded by themselves: an effective number of degrees of freedom would be large where two or three
+    # positions lie on the line by chance.
+    expanded = float(np.linalg.norm(u * [coverage_factor(len(mass_kg) - 2), coverage_factor(math.inf)]))
+    return Hooke(Estimate(k, k * float(np.linalg.norm(u)), "N/m"), k * expanded, mass_kg, position_m, line)

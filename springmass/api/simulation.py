@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pipeline.dynamics.integrator import Integrator
 from pipeline.dynamics.methods import OneStep, acceleration
 from pipeline.errors import DynamicsError
 from springmass.api.analysing import AnyScene
 from springmass.loading.scenes import scene_from
-from springmass.simulations.simulation import band_of, default_tolerance, instability, prepare, solve
+from springmass.simulations.simulation import SimulationOptions, simulated
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -67,16 +66,15 @@ def simulate(
     given_scene, seconds = scene_from(scene), float(times[-1])
     if given_scene is None:
         raise DynamicsError("simulate takes a scene, got None", "give a Scene, its tables or the path of its file")
-    ready = prepare(given_scene, seconds)
-    band, _ = band_of(ready, seconds)
-    integrator: str | Integrator = method if isinstance(method, str) else _own(method)
-    if tolerance is None and method == "auto":
-        tolerance = default_tolerance(band)
-    if isinstance(method, str):
-        wrong, _ = instability(ready.problem, method, spacing_s if tolerance is None else None)
-        if wrong:
-            raise DynamicsError(wrong, 'give times with a smaller step, a tolerance, or method="strang"')
-    solution = solve(ready.problem, integrator, spacing_s, times.size - 1, tolerance)
+    options = SimulationOptions(
+        method=method if isinstance(method, str) else _own(method),
+        spacing_s=spacing_s,
+        seconds=seconds,
+        tolerance=tolerance,
+        force=not isinstance(method, str),
+    )
+    found = simulated(given_scene, options)
+    solution, band = found.solution, found.band
     around = np.zeros((4, times.size)) if band is None else band.displacement_at(times)
     of = {"displacement": solution.trajectory.y, "u_displacement": 0.5 * (around[2] - around[1])}
     data = {name: ("time", values, {"units": "m"}) for name, values in of.items()}

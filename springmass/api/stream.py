@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from acquisition.block import Block
-from acquisition.buffer import SampleBuffer
 from pipeline.errors import TrackError
 from springmass.api.analysing import AnyScene
 from springmass.loading.options import AnalysisOptions
@@ -50,7 +49,6 @@ class Stream:
         self._end_s = -math.inf
         self._rolling = Rolling(
             lambda block: Run.of((block.t, block.distance), stated, how),
-            SampleBuffer(),
             share=STREAM_SHARE,
             now=lambda: self._end_s,
         )

@@ -89,7 +89,7 @@ def _converse(address: str, commands: list[str]) -> Identity:
             while decoder.status.identity is None and decoder.faults["refused_command"] == refused:
                 if clock.now_ns() > end_ns:
                     raise ProgramError(f"{address}: no answer to {command!r}", "try again", SENSOR)
-                decoder.feed(0, _heard(port, clock, 0.05))
+                decoder.feed(0, _heard(port, clock))
             if decoder.faults["refused_command"] > refused:
                 raise ProgramError(
                     f"{address}: the device does not take {command!r}",
@@ -111,12 +111,12 @@ def _ask(port: SerialPort, decoder: LineProtocolDecoder, clock: SystemClock, end
         port.write(FAMILY.identify)
         until_ns = clock.now_ns() + int(ASK_EVERY_S * 1e9)
         while decoder.status.identity is None and clock.now_ns() < until_ns:
-            heard += len(decoder.feed(0, _heard(port, clock, 0.05)))
+            heard += len(decoder.feed(0, _heard(port, clock)))
 
 
-def _heard(port: SerialPort, clock: SystemClock, wait_s: float) -> bytes:
+def _heard(port: SerialPort, clock: SystemClock) -> bytes:
     """Return the bytes received; return after the timeout if there are none."""
-    data = port.read(wait_s)
+    data = port.read(0.05)
     if not data:
         clock.sleep_until_ns(clock.now_ns() + 1_000_000)
     return data

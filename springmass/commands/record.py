@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import queue
 import shlex
 import sys
 from collections.abc import Iterator
@@ -47,7 +46,7 @@ from springmass.session.bench_requests import Closed, Operator
 from springmass.session.detect import name_sensors
 from springmass.session.file_names import default_name, demand_new
 from springmass.session.sensors import OpenSensor
-from springmass.session.session import BYTES_PER_READ, Ended, RunLimits, RunListeners, Session
+from springmass.session.session import BYTES_PER_READ, Ended, Marks, RunLimits, RunListeners, Session
 from springmass.session.trigger import Disarmed, Trigger
 from springmass.simulations.bench import EXAMPLE, REST_M, Release, bench_position
 from springmass.stops import STOPS, EndReason
@@ -58,7 +57,7 @@ from springmass.terminal.style import style_of, watched
 from storage.errors import WriteFailed, one_line
 from storage.recorder import check_disk
 from storage.recovery.recover import recover
-from storage.recovery.report import RecoverReport
+from storage.recovery.report import RecoveredRun, RecoverReport
 from storage.run_file.reading import open_run
 
 U_RULER_M = 0.5e-3
@@ -154,29 +153,27 @@ def record(
             title=options.title,
             stops=STOPS,
         )
-        STOPS.last_words = lambda: _stopped(session, log)
         console = Console(lambda error: session.failures.note("stderr", error))
         beside.callback(console.close)
-        page = None
+        page, marks = None, Marks()
         try:
             if options.page:
                 words = option_words(vars(page_options))
-                process = PageProcess(words, log, queue.SimpleQueue(), STOPS, session.failures, console.line)
-                page = beside.enter_context(process)
-            ended = _Bench(session, options, log, console, release, page).record()
-            session.stop()
-            failed, status = session.failures.describe(), ended.status
-            if status.error:
-                failed.append(f"springmass: {status.error}")
-                failed.append(f"springmass: {status.dropped_records} records that came later were not kept")
-            for line in failed:
-                console.line(line)
-            code, run_file, sentences = _built(ended, out, session)
+                page = beside.enter_context(PageProcess(words, log, marks, STOPS, session.failures, console.line))
+            with STOPS.leaving(lambda: _stopped(session, log)):
+                ended = _Bench(session, options, log, console, release, page, marks).record()
+                session.stop()
+                failed, status = session.failures.describe(), ended.status
+                if status.error:
+                    failed.append(f"springmass: {status.error}")
+                    failed.append(f"springmass: {status.dropped_records} records that came later were not kept")
+                for line in failed:
+                    console.line(line)
+                code, run_file, sentences = _built(ended, out, session)
             for line in sentences:
                 console.line(line)
             if run_file is not None and watched(sys.stderr):
                 console.line(f"next: springmass analyse {shlex.quote(str(run_file))}")
-            session.recorder = None
             if page is not None and run_file is not None and ended.by is EndReason.PAGE:
                 page.tell("built", run=str(run_file))
                 page.attend()
@@ -205,7 +202,7 @@ def _built(ended: Ended, out: Path, session: Session) -> tuple[int, Path | None,
     except Exception as error:
         code = SENSOR if status.error or isinstance(error, WriteFailed) else UNREADABLE
         return code, None, [f"springmass: the run file was not built ({one_line(error)}); {_what_to_do(log)}"]
-    lines = list(report.describe())
+    lines = [line for run in report.runs for line in _how_read(run)] + list(report.describe())
     if not report.log_removed and log.exists():
         lines.append(f"{log}: the log stays")
     first = [run for run in report.runs if run.part == 1]
@@ -224,6 +221,29 @@ def _built(ended: Ended, out: Path, session: Session) -> tuple[int, Path | None,
         lines.append(f"stopped by {ended.by}; everything up to then is saved")
         code = INTERRUPTED
     return code, report.main.path, lines
+
+
+def _how_read(run: RecoveredRun) -> Iterator[str]:
+    """Yield how often lines without a clock of their own came, and what would give them better times."""
+    lines = run.decoding.get("clock", {}).get("lines")
+    if not lines or lines["u_rate_ppm"] is None or run.existed:
+        return
+    how = {
+        "even": "their times are whole steps of an even rate",
+        "echo": "their times are steps of a wait and the time of the echo",
+        "reads": "they come at no even rate, so their times are spread between the reads",
+    }[lines["steps"]]
+    u = f"known to {lines['u_rate_ppm']:.2g} ppm"
+    yield (
+        f"{run.sensor.port}: {lines['rate_hz']:.4g} lines per second without a time, read every "
+        f"{1e3 * lines['read_s']:.3g} ms, {lines['lost']} lost; {how} ({u})"
+    )
+    usb = Path(os.path.realpath(run.sensor.port)).name
+    if lines["read_s"] * lines["rate_hz"] > 1.2 and usb.startswith("ttyUSB"):
+        setting = f"/sys/bus/usb-serial/devices/{usb}/latency_timer"
+        yield f"{run.sensor.port}: the adapter collects lines; `echo 1 | sudo tee {setting}` makes it send at once"
+    elif lines["read_s"] * lines["rate_hz"] > 1.2 and usb.upper().startswith("COM"):
+        yield f"{run.sensor.port}: the adapter collects lines; set its latency timer to 1 ms in the Device Manager"
 
 
 def _usable(channel: int, report: RecoverReport, session: Session) -> bool:
@@ -270,6 +290,7 @@ class _Bench:
     console: Console
     release: Release
     page: PageProcess | None
+    marks: Marks
 
     def record(self) -> Ended:
         """Run the session, with a page from before its beginning to its end."""
@@ -298,11 +319,9 @@ class _Bench:
 
     def _recorded(self, limits: RunLimits, operator: Operator | None) -> Ended:
         style = style_of(sys.stderr)
-        with marks_by_keys(watched=style.terminal) as typed:
-            marks = typed
-            if self.page is not None:
-                marks = self.page.marks = self.page.marks if typed is None else typed
-            show = ProgressLine(self.console, style, keys=typed is not None)
+        with marks_by_keys(self.marks, watched=style.terminal) as typed:
+            marks = self.marks if typed or self.page is not None else None
+            show = ProgressLine(self.console, style, keys=typed)
             listeners = RunListeners(progress=show, marks=marks)
             try:
                 if operator is None:

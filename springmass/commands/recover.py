@@ -25,14 +25,9 @@ def recover(
     ] = None,
 ) -> int:
     """Rebuild the run; the log stays."""
-    STOPS.last_words = lambda: f"stopped immediately; the log stays: {log}"
-    report = build(
-        log,
-        None if output is None else Path(output),
-        overwrite=overwrite,
-        speed_of_sound_m_per_s=speed_of_sound,
-        provenance=made_now(),
-    )
+    out = None if output is None else Path(output)
+    with STOPS.leaving(lambda: f"stopped immediately; the log stays: {log}"):
+        report = build(log, out, overwrite=overwrite, speed_of_sound_m_per_s=speed_of_sound, provenance=made_now())
     for line in report.describe():
         LOG.info(line)
     LOG.log(HINT, f"springmass analyse {shlex.quote(str(report.main.path))}")

@@ -12,9 +12,7 @@ from typing import Annotated, Literal
 
 from acquisition.errors import visible
 from pipeline.dynamics.band import Band
-from pipeline.dynamics.strang import STRANG
-from pipeline.errors import DynamicsError
-from pipeline.results.effects import Effect, simulated_effects
+from pipeline.results.effects import Effect
 from springmass.commands.given import GivenOptions
 from springmass.commands.options import FiguresOption, FileArgument, Json, Overwrite, ReadPairs
 from springmass.commands.parameters import Finite, Positive, Whole, flag, option, output
@@ -22,24 +20,18 @@ from springmass.errors import HINT, LOG, OK, ProgramError
 from springmass.loading.inputs import RUN_SUFFIXES
 from springmass.loading.options import AnalysisOptions
 from springmass.loading.scenes import ask_about, read_scene
-from springmass.result.run_json import picked
 from springmass.runs.run import Run
+from springmass.simulations.against import deviation_text
 from springmass.simulations.simulation import (
     Growth,
     Simulation,
-    band_of,
-    count_of,
-    default_tolerance,
-    growths,
-    instability,
+    SimulationOptions,
+    UnstableStep,
     prediction,
-    prepare,
     simulated,
     summary,
 )
 from springmass.terminal.printing import wrapped
-
-GROWTH_COLUMNS = ("method", "predicted", "measured", "fails_above_s")
 
 
 def simulate(
@@ -86,66 +78,50 @@ def simulate(
     where, say = str(against if scene is None else scene), sys.stderr if as_json else sys.stdout
     if run_file is not None and run_file.exists() and not overwrite:
         raise ProgramError(f"{visible(str(run_file))}: exists", "take another name, or --overwrite")
-    stated, analysis, longest_s = None if scene is None else read_scene(scene), None, seconds or 10.0
+    stated, run = None if scene is None else read_scene(scene), None
     if scene is not None and stated is not None:
         ask_about(stated, scene)
     if against is not None:
-        from springmass.simulations.against import duration_s
-
         run = Run.of(against, stated, AnalysisOptions(**reading.options.given()))
-        stated, analysis = run.scene, run.analysis
-        longest_s = max(seconds or 0.0, duration_s(analysis))
-        seconds = seconds or longest_s
-    count = count_of(seconds or 10.0, dt)
+        stated = run.scene
     assert stated is not None
-    ready = prepare(stated, longest_s, analysis=analysis, where=where)
-    if ready.from_run:
-        LOG.info(f"from {against}: {', '.join(ready.from_run)}")
-    band, of_band = band_of(ready, longest_s)
-    wanted = default_tolerance(band) if tolerance is None and method == "auto" else tolerance
-    wrong, limit = instability(ready.problem, method, dt if tolerance is None else None)
-    if wrong and not force:
-        smaller = f"take --dt {limit} or less, " if limit else "take "
-        other = "auto" if method == STRANG.name else "strang"
-        other += "" if math.isfinite(STRANG.stable_step(ready.problem)) else ", which has no limit"
-        raise ProgramError(f"{where}: {wrong}", f"{smaller}--method {other}, or --force to run it all the same")
-    effects = simulated_effects(ready.stated, ready.problem, dt * count, ready.drag)
-    try:
-        simulation = simulated(ready.problem, method, dt, count, wanted, check=check)
-    except DynamicsError as error:
-        raise ProgramError(error.problem, error.remedy, where=f"{where}: ") from error
-    print(wrapped(f"band             {of_band}", " " * 17), file=sys.stderr)
-    print(_before(_tolerance(wanted, band, given=tolerance is not None), effects), file=say)
-    print(_after(simulation, count), file=say)
-    grown = growths(ready.problem, dt, count)
-    print("\n".join(_grown(each) for each in grown), file=say)
-    results, over = (
-        summary(simulation, effects, wanted, band) | {"growth": [picked(each, GROWTH_COLUMNS) for each in grown]},
-        None,
+    options = SimulationOptions(
+        method=method, spacing_s=dt, seconds=seconds, tolerance=tolerance, check=check, force=force
     )
-    if analysis is not None:
-        from springmass.simulations.against import compare_with_run, deviation_text
-
-        over = compare_with_run(analysis, ready.problem, method, dt, wanted, band, ready.values())
-        left = f"rms {over.rms_m * 1e3:.3g} mm, noise of a sample {over.noise_m * 1e3:.3g} mm"
-        print("\n".join([f"against the run  {left}", *deviation_text(over)]), file=say)
-        results["against"] = over.summary()
+    try:
+        simulation = simulated(stated, options, run, where)
+    except UnstableStep as error:
+        smaller = f"take --dt {error.limit} or less, " if error.limit else "take "
+        remedy = f"{smaller}--method {error.other}, or --force to run it all the same"
+        raise ProgramError(error.problem, remedy, where=f"{where}: ") from error
+    print(wrapped(f"band             {simulation.of_band}", " " * 17), file=sys.stderr)
+    print(_described(simulation, given=tolerance is not None), file=say)
     made = run_file
     if run_file is not None:
         from springmass.simulations.run_files import write_readings
 
-        write_readings(run_file, ready, simulation, sensor, seed, where, results)
+        write_readings(run_file, simulation, sensor, seed)
     elif folder is not None:
-        from springmass.report.simulated import write_folder
+        from springmass.report.simulated import write
 
-        made = write_folder(simulation, over, band, ready.solved, where, folder, results, figures)
+        made = write(folder, simulation, figures)
     if made is not None:
         print(f"written          {visible(str(made))}", file=say)
         of_scene = "" if scene is None else f" --scene {shlex.quote(where)}"
         LOG.log(HINT, f"springmass analyse {shlex.quote(str(run_file or made / 'run.h5'))}{of_scene}")
     if as_json:
-        print(json.dumps(results))
+        print(json.dumps(summary(simulation)))
     return OK
+
+
+def _described(simulation: Simulation, *, given: bool) -> str:
+    """Return the lines about a simulation; ``given`` is whether its tolerance was an option."""
+    lines = [_before(_tolerance(simulation.tolerance, simulation.band, given=given), simulation.effects)]
+    lines += [_after(simulation), *map(_grown, simulation.growths)]
+    if (over := simulation.against) is not None:
+        left = f"rms {over.rms_m * 1e3:.3g} mm, noise of a sample {over.noise_m * 1e3:.3g} mm"
+        lines += [f"against the run  {left}", *deviation_text(over)]
+    return "\n".join(lines)
 
 
 def _tolerance(tolerance: float | None, band: Band | None, *, given: bool) -> str:
@@ -167,9 +143,9 @@ def _before(tolerance: str, effects: Sequence[Effect]) -> str:
     return "\n".join([*lines, *([wrapped(tolerance, " " * 17)] if tolerance else [])])
 
 
-def _after(simulation: Simulation, count: int) -> str:
+def _after(simulation: Simulation) -> str:
     """Return method, step, errors and time."""
-    solution, check = simulation.solution, simulation.check
+    solution, check, count = simulation.solution, simulation.check, simulation.count
     lines, steps = [f"method           {solution.integrator.words}"], f"{count} states"
     if solution.integrator.order:
         steps = f"{solution.parts * count} steps"

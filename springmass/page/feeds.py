@@ -14,7 +14,7 @@ from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
 from springmass.loading.loaded import Loaded
 from springmass.page.view import SensorSamples, View
-from springmass.report.recorded import event_words
+from springmass.report.recorded import named_event
 from storage.errors import NotALog, StorageError
 from storage.schema import plain
 from storage.wire_log.records import Record, RecordKind, event_of
@@ -100,7 +100,7 @@ class LogFeed:
         if isinstance(typed, Zeroed):
             self.view.zero = typed.facts
         if event is not None and not isinstance(typed, NOT_LISTED):
-            self.view.notes.append(event_words(event, named=True))
+            self.view.notes.append(named_event(event))
 
     def _place_marks(self) -> None:
         """Give marks and triggers the times that the run file will give them, which the first samples improve."""

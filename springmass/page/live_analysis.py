@@ -173,8 +173,8 @@ class Watcher:
         live, samples = AnalysisOptions(accuracy="fast", law=law), view.series[0]
         self._whole = AnalysisOptions(law=law)  # the accuracy of every command
         self._wanted_u_s = wanted_u_s
-        self._all = Rolling(lambda block: view.live_run(block, live), samples, share=ANALYSIS_SHARE)
-        self._recent = Rolling(lambda block: view.live_run(block, live), samples, share=ANALYSIS_SHARE)
+        self._all = Rolling(lambda block: view.live_run(block, live), share=ANALYSIS_SHARE, samples=samples)
+        self._recent = Rolling(lambda block: view.live_run(block, live), share=ANALYSIS_SHARE, samples=samples)
         self._run = None if view.loaded is None else Run(view.loaded, how=self._whole)
         self._closed = False
         self._wake = threading.Event()

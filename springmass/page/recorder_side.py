@@ -20,6 +20,7 @@ from typing import IO, Any
 
 from acquisition.events import Noted
 from springmass.session.failures import Failures
+from springmass.session.session import Marks
 from springmass.stops import EndReason, Stops
 
 ENDS_WITHIN_S = 5.0
@@ -31,20 +32,20 @@ class PageProcess:
     """The process of ``springmass page``, as a context manager; the recording goes on if it ends early.
 
     ``arguments`` are its options, ``log`` is the log of the future recording, from which it derives the name of the
-    run. ``marks`` receives the marks, and may be replaced before the recording begins; ``requests`` receives the other
-    requests of the page. ``say`` prints lines on the terminal.
+    run. ``marks`` receives the marks and notes of viewers, and ``requests`` their other requests. ``say`` prints lines
+    on the terminal.
     """
 
     def __init__(
         self,
         arguments: list[str],
         log: Path,
-        marks: queue.SimpleQueue[str],
+        marks: Marks,
         stops: Stops,
         failures: Failures,
         say: Callable[[str], None],
     ) -> None:
-        self._log, self.marks, self._stops, self._failures, self._say = log, marks, stops, failures, say
+        self._log, self._marks, self._stops, self._failures, self._say = log, marks, stops, failures, say
         self._command = [sys.executable, "-m", "springmass", "page", *arguments, "--", str(log)]
         self.requests: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
         self._lines: queue.SimpleQueue[dict[str, Any] | None] = queue.SimpleQueue()
@@ -117,11 +118,10 @@ class PageProcess:
         if kind == "stop":
             self._stops.ask(EndReason.PAGE)
         elif kind == "mark":
-            self.marks.put(message["text"] or "mark")
+            self._marks.put(message["text"] or "mark")
         elif kind == "note":
-            # A note becomes an event of the log, which exists only during the recording.
-            if message["text"] and (tell := self._failures.tell) is not None:
-                tell(Noted(text=message["text"]))
+            if message["text"]:
+                self._marks.put(Noted(text=message["text"]))
         elif kind == "line":
             self._say(message["text"])
         else:

@@ -13,11 +13,11 @@ from typing import Any, Literal
 import numpy as np
 
 from acquisition.block import Block, ClockKind, SourceInfo
-from acquisition.buffer import SampleBuffer
+from acquisition.buffer import GrowingColumns
 from springmass.loading.loaded import Loaded
 from springmass.loading.options import AnalysisOptions
 from springmass.result.run_json import plain
-from springmass.runs.rolling import live_run
+from springmass.runs.rolling import COLUMNS, columns_of, live_run
 from springmass.runs.run import Run
 from storage.wire_log.wire_samples import Origin
 
@@ -27,17 +27,17 @@ SHOWN_NOTES = 20  # the latest
 _HEAD = struct.Struct("<4I")
 
 
-class SensorSamples(SampleBuffer):
+class SensorSamples(GrowingColumns):
     """The samples of one sensor, the number without a distance, and the host time of t = 0."""
 
     def __init__(self) -> None:
-        super().__init__()
+        super().__init__(*COLUMNS)
         self.missing = 0
         self.origin = Origin()
 
     def push(self, block: Block) -> None:
         """Append samples."""
-        super().push(block)
+        self.append(*columns_of(block))
         self.missing += int(np.count_nonzero(np.isnan(block.distance)))
         self.origin.push(block)
 

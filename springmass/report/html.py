@@ -23,7 +23,7 @@ from springmass.report.words import method, summary
 from springmass.result.advice import notices_of, trust_of
 from springmass.result.budget_tables import budgets_of
 from springmass.result.law_rows import laws_across, laws_of
-from springmass.result.table1 import table_rows
+from springmass.result.table1 import rows_and_needs, table_rows
 from springmass.runs.run import Run
 from springmass.typeset import cells, page_unit, prefixed, pretty, pretty_number, typeset
 
@@ -69,25 +69,25 @@ class Figures:
 
 def render_html(
     runs: Sequence[Run],
-    charts: Sequence[Mapping[str, Chart]],
+    charts: Mapping[str, Mapping[str, Chart]],
     *,
     compared: SpringComparison | None = None,
     several: Mapping[str, Chart],
     pictures: Mapping[str, bytes],
-    stems: Sequence[str],
     provenance: Mapping[str, Any],
     script: str = "",
 ) -> str:
     """Return the report as one page, which contains its script, or refers to it if it has an address.
 
-    The template engine escapes every text; only scripts and styles, which are made here, are inserted unescaped. The
-    numbers of the charts are JSON, in which no text can end the surrounding element.
+    ``charts`` are those of each run, by the prefix of the names of its figures, and ``several`` those of all runs. The
+    template engine escapes every text; only scripts and styles, which are made here, are inserted unescaped. Numbers of
+    charts are JSON, in which no text can end the surrounding element.
     """
     figures = Figures(pictures)
     overview = {name: figures.add(chart) for name, chart in several.items()}
     parts = [
         _part(i, run, of_run, figures, stem)
-        for i, (run, of_run, stem) in enumerate(zip(runs, charts, stems, strict=True))
+        for i, (run, (stem, of_run)) in enumerate(zip(runs, charts.items(), strict=True))
     ]
     return template("report.html.j2").render(
         title=", ".join(run.name for run in runs),
@@ -156,7 +156,7 @@ def _tables(runs: Sequence[Run]) -> Iterator[dict[str, Any]]:
         some = runs[first : first + BESIDE]
         rows = [
             replace(row, estimates=tuple(None if x is None else prefixed(x) for x in row.estimates))
-            for row in table_rows([run.analysis for run in some], missing=True)
+            for row in rows_and_needs([run.analysis for run in some])
         ]
         trust = trust_of(some[0].analysis) if len(runs) == 1 else {}
         sound = bool(trust) and all(of_value.grade == "sound" for of_value in trust.values())

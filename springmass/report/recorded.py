@@ -29,6 +29,10 @@ _CALIBRATED = {
 }
 
 
+IN_WORDS = (Zeroed, Triggered, Noted)
+"""Events whose words name them."""
+
+
 def notes_of(recorded: Mapping[str, Any]) -> tuple[ChartNote, ...]:
     """Return marks and events of a recording in the order of their times."""
     marks = [ChartNote(mark["t_s"], visible(str(mark["text"])), "mark") for mark in recorded.get("marks", ())]
@@ -36,8 +40,14 @@ def notes_of(recorded: Mapping[str, Any]) -> tuple[ChartNote, ...]:
     return tuple(sorted([*marks, *events], key=lambda note: note.t_s))
 
 
-def event_words(event: StoredEvent, *, named: bool = False) -> str:
-    """Return an event in words; of most kinds the names and values of its facts, ``named`` by the kind."""
+def named_event(event: StoredEvent) -> str:
+    """Return an event in words that name it."""
+    words = event_words(event)
+    return words if isinstance(event.typed, IN_WORDS) else ": ".join(filter(None, (event.kind, words)))
+
+
+def event_words(event: StoredEvent) -> str:
+    """Return an event in words; of most kinds the names and values of its facts."""
     match event.typed:  # a log by another program may state other facts
         case Zeroed(rest_m=float() as rest_m, noise_m=float() as noise_m):
             return f"Zero {1e3 * rest_m:.1f} mm, noise {1e3 * noise_m:.2f} mm"
@@ -46,8 +56,7 @@ def event_words(event: StoredEvent, *, named: bool = False) -> str:
         case Noted(text=str() as text):
             return f"Note: {text}"
     facts = {name.replace("_", " "): value for name, value in event.facts.items() if value is not None}
-    words = ", ".join(f"{name} {x:.4g}" if isinstance(x, float) else f"{name} {x}" for name, x in facts.items())
-    return ": ".join(filter(None, (event.kind, words))) if named else words
+    return ", ".join(f"{name} {x:.4g}" if isinstance(x, float) else f"{name} {x}" for name, x in facts.items())
 
 
 def calibration_of(recorded: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:

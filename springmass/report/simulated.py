@@ -6,18 +6,15 @@ import io
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline.bench.scene import Scene
-from pipeline.dynamics import effective_mass_kg
 from pipeline.dynamics.band import LEVELS, Band
 from pipeline.track import F8
 from springmass.result.output_names import in_a_name, make_folder
-from springmass.simulations.against import Against
 from springmass.simulations.run_files import write_states
-from springmass.simulations.simulation import Simulation
+from springmass.simulations.simulation import Simulation, summary
 
 if TYPE_CHECKING:
     from springmass.charts.draw import PictureFormat
@@ -30,44 +27,32 @@ FILES = frozenset(
 )
 
 
-def write_folder(
-    simulation: Simulation,
-    against: Against | None,
-    band: Band | None,
-    scene: Scene,
-    where: str,
-    out: str | Path,
-    results: Mapping[str, Any],
-    kinds: Sequence[PictureFormat] = (),
-) -> Path:
+def write(out: str | Path, simulation: Simulation, figures: Sequence[PictureFormat] = ()) -> Path:
     """Write run file, page of charts, tables, JSON and the kinds of figures into NAME.simulated; return the folder."""
     from springmass.charts.draw import save
     from springmass.report.html import Figures, drawn_by_script, template
     from springmass.simulations import charts as charted
     from storage.atomic import whole_folder, write_whole
 
-    name = Path(where).name.removesuffix(".toml").removesuffix(".scene")
-    target = make_folder(out) / in_a_name(name, ".simulated")
-    charts, tables = list(charted.simulation(simulation, effective_mass_kg(scene), against)), {}
-    trajectory = simulation.trajectory
-    if band is not None:
-        charts.append(charted.band(simulation, band))
-        tables["band"] = _band_columns(band, trajectory.t, trajectory.y)
-    if against is not None:
-        charts.insert(0, charted.against(against))
+    where, trajectory = Path(simulation.where).name, simulation.trajectory
+    target = make_folder(out) / in_a_name(where.removesuffix(".toml").removesuffix(".scene"), ".simulated")
+    charts, tables = charted.simulation(simulation), {}
+    if simulation.band is not None:
+        tables["band"] = _band_columns(simulation.band, trajectory.t, trajectory.y)
+    if (against := simulation.against) is not None:
         tables["against"] = {"t_s": against.t, "measured_m": against.measured, "predicted_m": against.predicted}
         if against.band is not None:
             tables["against"] |= _edges("predicted", against.predicted + against.band, "m")
     with whole_folder(target, FILES, "simulation.json") as folder:
-        title = f"{Path(where).name} by {simulation.solution.integrator.name}"
-        write_states(folder / "run.h5", trajectory, scene, where, title, results)
-        figures = Figures(save(charts, make_folder(folder / "figures"), kinds) if kinds else {})
-        shown = [figures.add(chart) for chart in charts]
-        page = template("charts.html.j2").render(title=title, figures=shown, **drawn_by_script(figures.charts))
+        title = f"{where} by {simulation.solution.integrator.name}"
+        write_states(folder / "run.h5", simulation, title)
+        drawn = Figures(save(charts, make_folder(folder / "figures"), figures) if figures else {})
+        shown = [drawn.add(chart) for chart in charts]
+        page = template("charts.html.j2").render(title=title, figures=shown, **drawn_by_script(drawn.charts))
         write_whole(folder / SIMULATION_PAGE, page)
         for table_name, table in tables.items():
             write_whole(folder / f"{table_name}.csv", _table(table))
-        write_whole(folder / "simulation.json", json.dumps(results, indent=2) + "\n")
+        write_whole(folder / "simulation.json", json.dumps(summary(simulation), indent=2) + "\n")
     return target
 
 

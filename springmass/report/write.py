@@ -98,11 +98,10 @@ def write_report(
             write_whole(folder / name, table)
         page = render_html(
             runs,
-            charts,
+            dict(zip(stems, charts, strict=True)),
             compared=compared,
             several=several,
             pictures=pictures,
-            stems=stems,
             provenance=(summary or results[0])["provenance"],
             script=script,
         )

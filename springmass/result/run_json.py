@@ -8,20 +8,35 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from acquisition.recordings.recording import FormatIssue
-from pipeline.analyse import Analysis, Oscillation
+from pipeline.analyse import Oscillation
 from pipeline.findings.finding import UNKNOWN_CODE, Finding, by_severity, kinds, word
 from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.registry.found import Found
 from pipeline.results.budget import Contribution
-from pipeline.results.classic import Classic
 from springmass import __version__
 from springmass.loading.loaded import Loaded
+from springmass.loading.save import now_utc
+
+if TYPE_CHECKING:
+    from springmass.runs.run import Run
 
 RESULT_SCHEMA = 3
 EXPANDED = ("dof", "coverage_factor", "expanded")  # of a budget, for its expanded uncertainty
+NO_DETAILS: Mapping[str, Any] = {
+    "budget": {},
+    "correlations": {"names": [], "matrix": []},
+    "damping": {
+        **dict.fromkeys(("selected", "stated", "law")),
+        "admissible": [],
+        "weights": {},
+        "of_law": [],
+        "coefficients": {},
+        "laws": {},
+    },
+}
 
 
 def rejected(findings: Sequence[Mapping[str, str]]) -> list[str]:
@@ -30,32 +45,27 @@ def rejected(findings: Sequence[Mapping[str, str]]) -> list[str]:
     return list(dict.fromkeys(grave))
 
 
-def result_of(
-    loaded: Loaded,
-    analysis: Analysis,
-    classic: Classic | None,
-    accuracy: str,
-    parameters: Mapping[str, Any],
-    time_utc: str,
-) -> dict[str, Any]:
+def result_of(run: Run) -> dict[str, Any]:
     """Return the result as a JSON-serialisable mapping; numbers that are not finite become None.
 
-    The estimates of ``classic``, if it is given, replace those of the analysis.
+    The estimates of the lab report's own method, if the run asks for it, replace those of the analysis.
     """
-    estimates = classic.estimates if classic is not None else analysis.estimates
-    motion = analysis.motion if classic is None and isinstance(analysis.motion, Oscillation) else None
+    loaded, analysis, classic, how = run.loaded, run.analysis, run.classic, run.how
+    motion, parameters = analysis.motion, {**how.parameters, "scene": run.scene.to_mapping()}
+    if classic is not None or not isinstance(motion, Oscillation):
+        detailed = NO_DETAILS
+    else:
+        detailed = {"budget": _budgets(motion), "correlations": _correlations(motion), "damping": _damping(motion)}
     content = {
         "schema": RESULT_SCHEMA,
         "input": input_of(loaded),
         "recorded": _recorded(loaded),
         "quality": {**analysis.quality, "malformed_rows": loaded.recording.malformed_rows},
-        "estimates": estimates,
-        "budget": {} if motion is None else _budgets(motion),
-        "correlations": _NO_CORRELATIONS if motion is None else _correlations(motion),
-        "damping": _NO_DAMPING if motion is None else _damping(motion),
+        "estimates": analysis.estimates if classic is None else classic.estimates,
+        **detailed,
         "effects": analysis.effects,
         "findings": analysis.findings,
-        "provenance": provenance_of(accuracy, parameters, time_utc),
+        "provenance": provenance_of(how.method or how.accuracy, parameters, run.time_utc or now_utc()),
     }
     return {key: plain(value) for key, value in content.items()}
 
@@ -111,17 +121,6 @@ def _sentence(clause: str) -> str:
     first = clause.split(" ", 1)[0]
     # A name, such as a file name, keeps its case.
     return (clause[0].upper() + clause[1:] if first.isalpha() else clause) + end
-
-
-_NO_CORRELATIONS: dict[str, Any] = {"names": [], "matrix": []}
-_NO_DAMPING: dict[str, Any] = {
-    **dict.fromkeys(("selected", "stated", "law")),
-    "admissible": [],
-    "weights": {},
-    "of_law": [],
-    "coefficients": {},
-    "laws": {},
-}
 
 
 def _budgets(motion: Oscillation) -> dict[str, Any]:

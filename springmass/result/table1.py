@@ -97,11 +97,8 @@ def _shown_estimates(analysis: Analysis) -> dict[TableKey, Estimate]:
 _IN_TABLE = tuple(name for name, quantity in QUANTITIES.items() if quantity.in_table)
 
 
-def table_rows(runs: Sequence[Analysis], *, missing: bool = False) -> tuple[TableRow, ...]:
-    """Return Table 1: every quantity that at least one run gives, with one column per run.
-
-    With ``missing``, a row says what the spring constant requires, if no run gives it.
-    """
+def table_rows(runs: Sequence[Analysis]) -> tuple[TableRow, ...]:
+    """Return Table 1: every quantity that at least one run gives, with one column per run."""
     columns = [table_estimates(run) for run in runs]
     rows = []
     for name, q in QUANTITIES.items():
@@ -122,16 +119,26 @@ def table_rows(runs: Sequence[Analysis], *, missing: bool = False) -> tuple[Tabl
                     estimates,
                 )
             )
-        if missing and name == "spring_constant" and not any(keys) and any(map(_needs_mass, runs, columns)):
-            rows.append(TableRow(name, q.label, q.symbol, q.page_symbol, q.tex_symbol, (None,) * len(runs), NEEDS_MASS))
     return tuple(rows)
+
+
+def rows_and_needs(runs: Sequence[Analysis]) -> tuple[TableRow, ...]:
+    """Return Table 1 with a line that says what the spring constant requires, if no run gives it."""
+    rows, constant, q = table_rows(runs), "spring_constant", QUANTITIES["spring_constant"]
+    if any(row.name == constant for row in rows) or not any(map(_needs_mass, runs)):
+        return rows
+    before = list(QUANTITIES)[: list(QUANTITIES).index(constant)]
+    at = sum(row.name.rpartition(".")[2] in before for row in rows)
+    row = TableRow(constant, q.label, q.symbol, q.page_symbol, q.tex_symbol, (None,) * len(runs), NEEDS_MASS)
+    return *rows[:at], row, *rows[at:]
 
 
 NEEDS_MASS = "needs the mass: --mass-kg KG"
 
 
-def _needs_mass(run: Analysis, column: Mapping[TableKey, Estimate]) -> bool:
+def _needs_mass(run: Analysis) -> bool:
     """Return whether a distance oscillates and only the mass is missing."""
+    column = table_estimates(run)
     amplitude = column.get(TableKey("amplitude"))
     of_length = TableKey("period") in column and amplitude is not None and amplitude.unit == "m"
     return of_length and run.scene.bob_mass_kg is None

@@ -22,7 +22,7 @@ from springmass.loading.arrays import loaded_of, refuse_reading
 from springmass.loading.load import load
 from springmass.loading.loaded import Loaded
 from springmass.loading.options import ANALYSIS_DEFAULTS, AnalysisOptions
-from springmass.loading.save import now_utc, save_run
+from springmass.loading.save import save_run
 from springmass.loading.scenes import scene_from, stated_keys
 from springmass.result.frames import estimates_frame, run_dataset, samples_dataset
 from springmass.result.run_json import result_of, with_traps
@@ -119,9 +119,7 @@ class Run(Mapping[str, Estimate]):
     @cached_property
     def result(self) -> dict[str, Any]:
         """The result as JSON has it: what ``springmass analyse --json`` prints and the report stores."""
-        parameters = {**self.how.parameters, "scene": self.scene.to_mapping()}
-        accuracy = self.how.method or self.how.accuracy
-        return result_of(self.loaded, self.analysis, self.classic, accuracy, parameters, self.time_utc or now_utc())
+        return result_of(self)
 
     @property
     def ok(self) -> bool:

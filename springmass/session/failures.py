@@ -5,13 +5,14 @@ A ``Worker`` does what may fail or wait, such as showing the recording, on a thr
 
 from __future__ import annotations
 
+import contextlib
 import queue
 import threading
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
-from acquisition.events import Event, StoredEvent
+from acquisition.events import StoredEvent
 from storage.errors import one_line
 
 LAST_STEP_S = 1.0
@@ -19,22 +20,28 @@ LAST_STEP_S = 1.0
 
 
 class Failures:
-    """Counts failures by component, error and the line that raised it; any thread may report a failure.
-
-    During a recording, ``tell`` makes an event of the first failure of each kind.
-    """
+    """Counts failures by component, error and the line that raised it; any thread may report a failure."""
 
     def __init__(self) -> None:
-        self.tell: Callable[[StoredEvent | Event], None] | None = None
+        self._tell: Callable[[StoredEvent], None] | None = None
         self._lock = threading.Lock()
         self._counts: dict[str, int] = {}
+
+    @contextlib.contextmanager
+    def told_to(self, tell: Callable[[StoredEvent], None]) -> Iterator[None]:
+        """In this context, which is that of a recording, make an event of the first failure of each kind."""
+        self._tell = tell
+        try:
+            yield
+        finally:
+            self._tell = None
 
     def note(self, what: str, error: BaseException) -> None:
         """Count a failure of a component, such as the display, a decoder or the reader."""
         where = raised_at(error)
         name = f"{what}: {type(error).__name__} at {where}"
         with self._lock:
-            tell = None if name in self._counts else self.tell
+            tell = None if name in self._counts else self._tell
             self._counts[name] = self._counts.get(name, 0) + 1
         if tell is not None:
             tell(StoredEvent(f"{what}_failed", {"error": type(error).__name__, "why": one_line(error), "where": where}))

@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,9 +18,11 @@ from acquisition.block import I8, Block, Flag
 from acquisition.decoders.sensor import Sensor
 from acquisition.live.decoding import SensorChain
 from springmass.runs.rolling import NotYet, Rolling
-from springmass.runs.run import Run
 from storage.recorder import RecorderStatus
 from storage.wire_log.wire_samples import Origin
+
+if TYPE_CHECKING:
+    from springmass.runs.run import Run
 
 SECOND_NS = 1_000_000_000
 USELESS_S = 0.8

@@ -15,21 +15,19 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from acquisition.block import Block
-from acquisition.buffer import SampleBuffer
 from acquisition.clock import Clock
-from acquisition.events import RunEnded, Triggered, Zeroed
+from acquisition.events import Noted, RunEnded, Triggered, Zeroed
 from acquisition.live.calibration import StillPoint, against_ruler, from_still
 from acquisition.live.reader import PortLine, PortReader
 from springmass import __version__
 from springmass.errors import SENSOR, ProgramError
 from springmass.loading.options import AnalysisOptions
 from springmass.runs.rolling import FEWEST, NotYet, Rolling, live_run
-from springmass.runs.run import Run
 from springmass.session.failures import Failures, Worker
 from springmass.session.live_state import SECOND_NS, LiveState, Progress, free_bytes, trouble_of
 from springmass.session.reads import Tee
@@ -42,6 +40,9 @@ from storage.schema import plain
 from storage.wire_log.records import LogHeader
 from storage.wire_log.scanning import LogContents
 
+if TYPE_CHECKING:
+    from springmass.runs.run import Run
+
 HEAR_S = 3.0  # silence before a run after which the sensor counts as absent
 HEARD = 3  # number of readings after which a sensor counts as heard
 LOOK_FOR_MARKS_S, LOOK_FOR_TRIGGER_S = 0.2, 0.05
@@ -50,10 +51,12 @@ BYTES_PER_READ = 64  # log bytes per reading, for the check of the disk space
 SHOWN_S = 10.0  # duration of the samples whose period and amplitude the progress line shows
 LIVE = AnalysisOptions(accuracy="fast")
 """The fast tier takes a third of the time of the standard tier, with which the run is analysed."""
-MOTION_SHARE = 0.007
+MOTION_SHARE = 0.01
 """Share of a core for the shown motion, a new one every other second; a recording may take 3 % with all else."""
 
 PortBlocks = Sequence[tuple[int, Block]]
+Marks = queue.SimpleQueue[str | Noted]
+"""Marks to put into a run, and notes about it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +73,7 @@ class RunListeners:
     """What is called during the recording of a run, and the queue of marks to put into it."""
 
     progress: Callable[[Progress], None] = lambda _: None  # about once a second, on a separate thread
-    marks: queue.SimpleQueue[str] | None = None
+    marks: Marks | None = None
     begun: Callable[[Path], None] = lambda _: None  # once reads are recorded in this log
     changed: Callable[[], bool] = lambda: False  # whether to stop waiting for the trigger
 
@@ -216,8 +219,8 @@ class Session:
         with self.stops.raising(False):
             recorder = self.recorder = Recorder(log, self._header(), self._clock)
             start_ns = self._clock.now_ns()
-            self.failures.tell = lambda event: recorder.event(0, self._clock.now_ns(), event)
-            with self._display(listeners, start_ns, recorder) as show:
+            telling = self.failures.told_to(lambda event: recorder.event(0, self._clock.now_ns(), event))
+            with telling, self._display(listeners, start_ns, recorder) as show:
                 try:
                     self._tee.start(recorder, self._chains, since_ns)
                     listeners.begun(recorder.path)
@@ -258,7 +261,7 @@ class Session:
         show: Callable[..., None],
         start_ns: int,
         seconds: float | None,
-        marks: queue.SimpleQueue[str] | None,
+        marks: Marks | None,
     ) -> EndReason:
         """Wait for the end of the recording, and return the reason for it."""
         end_ns = None if seconds is None else start_ns + int(seconds * 1e9)
@@ -274,9 +277,12 @@ class Session:
             if recorder.status.error:
                 return EndReason.DISK
             while marks is not None and not marks.empty():
-                now_ns, text = self._clock.now_ns(), marks.get()
-                recorder.mark(text, host_ns=now_ns)
-                self._marks.append((now_ns, text))
+                now_ns, mark = self._clock.now_ns(), marks.get()
+                if isinstance(mark, Noted):
+                    recorder.event(0, now_ns, mark)
+                    continue
+                recorder.mark(mark, host_ns=now_ns)
+                self._marks.append((now_ns, mark))
                 show(self._tee.blocks, tick=False)
             if turn_ns == end_ns:
                 break
@@ -344,15 +350,14 @@ class Session:
             yield show
         finally:
             worker.close("the last turn has not ended")
-            self.failures.tell = None  # the log takes no more events
 
     def _rolling(self, channel: int) -> Rolling:
         """Return the analysis of the last seconds of a channel of the first port."""
         chain, entry = self._chains[channel], self.sensors[0].entry(0)
         return Rolling(
             lambda block: live_run(block, chain.info(entry.port), self._scene, {"sensor": plain(entry)}, LIVE),
-            SampleBuffer(max(int(chain.timebase.rate_hz * SHOWN_S), FEWEST)),
             share=MOTION_SHARE,
+            most=max(int(chain.timebase.rate_hz * SHOWN_S), FEWEST),
             now=lambda: self._clock.now_ns() * 1e-9,
         )
 

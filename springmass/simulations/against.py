@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.analysis import Analysis
-from pipeline.dynamics import Problem
+from pipeline.dynamics import Problem, Trajectory
 from pipeline.dynamics.band import C16, Band
 from pipeline.numerics.estimate import Estimate
 from pipeline.track import F8
 from springmass.simulations.from_run import oscillation_of
-from springmass.simulations.simulation import FINE, count_of, solve
 
 WIDER = 1.96  # standard deviations of the noise by which the band is widened, for 95 %
 HALF = 0.5
@@ -70,26 +69,14 @@ class Against:
 
 
 def compare_with_run(
-    analysis: Analysis,
-    problem: Problem,
-    method: str,
-    step_s: float,
-    tolerance: float | None,
-    band: Band | None,
-    values: Mapping[str, Estimate] | None = None,
+    analysis: Analysis, trajectory: Trajectory, band: Band | None, values: Mapping[str, Estimate]
 ) -> Against:
-    """Lay a prediction over a measured run from its first used sample on; ``problem`` is of the completed scene.
+    """Lay a prediction over a measured run from its first used sample on.
 
-    The step of ``auto`` is short enough for interpolation. ``values`` are the inputs of the band by name, for which
-    the best-fitting values are sought.
+    With a band, those ``values`` of its inputs are sought that fit best.
     """
-    motion = oscillation_of(analysis)
-    used = analysis.conditioned.used
+    motion, used = oscillation_of(analysis), analysis.conditioned.used
     t, measured = analysis.track.t[used], analysis.track.y[used]
-    if method == "auto":
-        step_s = min(step_s, 1.0 / (FINE * problem.equation.angular_frequency_per_s))
-    count = count_of(step_s * max(1, math.ceil(duration_s(analysis) / step_s)), step_s)
-    trajectory = solve(problem, method, step_s, count, tolerance).trajectory
     rest, good = motion.rest.at(t), analysis.used[used]
     free = (t - t[0])[good], (measured - rest)[good], motion.waveform.velocity[used][good]
     predicted: F8 = rest + trajectory.at(t - t[0])
@@ -100,9 +87,9 @@ def compare_with_run(
     around = band.displacement_at(t - t[0])
     left = measured - predicted
     outside = (left < around[0] - WIDER * noise) | (left > around[3] + WIDER * noise)
-    shifts = _shifts(band, t - t[0], left, values or {})
+    shifts = _shifts(band, t - t[0], left, values)
     inside = 1.0 - float(np.mean(outside))
-    leaves_band_s = _leaves(t, outside, problem)
+    leaves_band_s = _leaves(t, outside, trajectory.problem)
     return Against(t, measured, predicted, rms, noise, free, around, inside, leaves_band_s, shifts)
 
 

@@ -8,21 +8,27 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.dynamics import Trajectory
+from pipeline.dynamics import Trajectory, effective_mass_kg
 from pipeline.dynamics.band import Band
 from pipeline.track import F8
 from springmass.charts.chart import Chart, Panel, Series, band_of, line_of
 from springmass.simulations.against import Against
-from springmass.simulations.simulation import EULERS, Eulers, Simulation, beside_exact, growths
+from springmass.simulations.simulation import EULERS, Eulers, Simulation, beside_exact
 
 PERIODS_DRAWN, TURNS = 14, 6  # periods in the detail of a long run; turns in a phase plot
 POINTS_DRAWN = 1500
 GROWN = 1e6  # multiple of the starting amplitude above which curves are cut off
 
 
-def simulation(solved: Simulation, mass_kg: float | None, over: Against | None = None) -> tuple[Chart, ...]:
-    """Return the charts of a simulation over a measured run; without a mass, the energy is that of one kilogram."""
-    runs = beside_exact(solved)
+def simulation(solved: Simulation) -> list[Chart]:
+    """Return the charts of a simulation, with those of the run and of the band if there are any."""
+    over = [] if solved.against is None else [against(solved.against)]
+    return [*over, *methods(solved), *([] if solved.band is None else [band(solved, solved.band)])]
+
+
+def methods(solved: Simulation) -> tuple[Chart, ...]:
+    """Return the charts of the Euler methods; without a mass, the energy is that of one kilogram."""
+    runs, mass_kg, over = beside_exact(solved), effective_mass_kg(solved.ready.solved), solved.against
     exact = runs.exact
     period = 2.0 * math.pi / float(solved.problem.equation.angular_frequency_per_s)
     turns = max(2, int(TURNS * period / exact.spacing_s) + 1)
@@ -52,7 +58,7 @@ def simulation(solved: Simulation, mass_kg: float | None, over: Against | None =
 
 
 def _growth(solved: Simulation) -> str:
-    forward, _ = growths(solved.problem, solved.trajectory.spacing_s, len(solved.trajectory.y) - 1)
+    forward, _ = solved.growths
     measured = "" if forward.measured is None else f", as computed here by {forward.measured:.6f}"
     return f"Each step of forward Euler multiplies the amplitude by √(1 + ω²h²) = {forward.predicted:.6f}{measured}."
 

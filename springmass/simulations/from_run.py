@@ -52,7 +52,8 @@ def scene_from_run(scene: Scene, analysis: Analysis, *, damping: bool = True) ->
         for name, attribute in SCENE_KEYS.items():
             if name in law.names:
                 slopes[len(taken), 2 + law.names.index(name)] = 1.0
-                taken[attribute] = replace(law[name], value=max(law[name].value, 0.0))
+                found = law[name]
+                taken[attribute] = Estimate(max(found.value, 0.0), found.u, found.unit)
     slopes = slopes[: len(taken)]
     measured = Joint(
         tuple(taken),

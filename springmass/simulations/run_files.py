@@ -16,17 +16,15 @@ from pipeline.bench.scene import Scene
 from pipeline.dynamics import Trajectory
 from springmass.loading.save import made_now
 from springmass.simulations.bench import REST_M
-from springmass.simulations.simulation import FINE, Prepared, Simulation, count_of, solve
+from springmass.simulations.simulation import FINE, Simulation, count_of, solve, summary
 
 
-def write_readings(
-    path: Path, ready: Prepared, solved: Simulation, sensor: str, seed: int, where: str, results: Mapping[str, Any]
-) -> None:
+def write_readings(path: Path, solved: Simulation, sensor: str, seed: int) -> None:
     """Write a sensor's readings of a simulated motion, one for each spacing, as a run of the kind "simulated".
 
     The noise is that of the scene's sensor, or else that of the simulated bench.
     """
-    name, motion = Path(where).name, solved.trajectory
+    name, motion, ready = Path(solved.where).name, solved.trajectory, solved.ready
     if sensor == "ideal":
         block, info = _exact(motion, name)
     else:
@@ -34,15 +32,15 @@ def write_readings(
         if ready.stated.sensor_sigma_m is not None:
             virtual = replace(virtual, noise_m=ready.stated.sensor_sigma_m.value)
         block, info = _readings(solved, virtual, name, seed)
-    configuration = {"sensor": sensor, "seed": seed, **results}
+    configuration = {"sensor": sensor, "seed": seed, **summary(solved)}
     _write_run(path, block, info, ready.solved, f"{name}, as a {sensor} sensor reads it", configuration)
 
 
-def write_states(
-    path: Path, trajectory: Trajectory, scene: Scene, where: str, title: str, results: Mapping[str, Any]
-) -> None:
+def write_states(path: Path, solved: Simulation, title: str) -> None:
     """Write the states of a motion as a run, as a sensor without noise, echoes or resolution would read them."""
-    _write_run(path, *_exact(trajectory, Path(where).name), scene, title, {"rest_m": _rest_m(trajectory), **results})
+    block, info = _exact(solved.trajectory, Path(solved.where).name)
+    configuration = {"rest_m": _rest_m(solved.trajectory), **summary(solved)}
+    _write_run(path, block, info, solved.ready.solved, title, configuration)
 
 
 def _rest_m(trajectory: Trajectory) -> float:

@@ -1,12 +1,12 @@
-"""A simulation: the scene prepared, its motion solved, and the error stated and measured."""
+"""A simulation: the motion that a scene predicts, with its band, its errors, and a measured run beside it."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,12 +20,17 @@ from pipeline.dynamics.methods import DOP853
 from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError
 from pipeline.numerics.estimate import Estimate, Joint
-from pipeline.results.effects import Effect
+from pipeline.results.effects import Effect, simulated_effects
 from pipeline.track import F8
-from springmass.errors import ProgramError
+from springmass.errors import LOG, ProgramError
 from springmass.result.run_json import picked, plain
+from springmass.simulations.against import Against, compare_with_run, duration_s
 from springmass.simulations.from_run import scene_from_run
 
+if TYPE_CHECKING:
+    from springmass.runs.run import Run
+
+DEFAULT_S = 10.0  # length of a simulation without a run
 DEFAULT_TOLERANCE = 1e-6
 FINE = 24.0  # states per radian; interpolation between them has an error of 1e-8 of the amplitude
 BAND_SHARE, LARGEST_DEFAULT = 0.01, 1e-3
@@ -33,6 +38,37 @@ MOST_SAMPLES = 20_000_000
 REFERENCE_RTOL = 1e-13
 EULERS = (("forward-euler", "forward Euler"), ("symplectic-euler", "symplectic Euler"))
 VISIBLE_ERROR, EXACT_ERROR = 1e-3, 1e-9  # errors over the amplitude: one that is visible, and one that is called exact
+EFFECT_COLUMNS = ("name", "predicted", "measured", "unit", "included", "why")
+GROWTH_COLUMNS = ("method", "predicted", "measured", "fails_above_s")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulationOptions:
+    """How a motion is simulated.
+
+    ``method`` is "auto" or an integrator, and ``spacing_s`` the time between two states. The simulation is as long as
+    ``seconds``, by default as the run with which it is compared, or 10 s. The ``tolerance`` is relative to the
+    amplitude; the default for "auto" follows from the band. With ``check`` the error is measured too, and ``force``
+    accepts an unstable step.
+    """
+
+    method: str | Integrator = "auto"
+    spacing_s: float = 0.01
+    seconds: float | None = None
+    tolerance: float | None = None
+    check: bool = False
+    force: bool = False
+
+
+class UnstableStep(DynamicsError):
+    """A step beyond the limit of its method; ``other`` is a method for it.
+
+    ``limit`` is the limit in s, rounded down; empty if no step is stable.
+    """
+
+    def __init__(self, problem: str, limit: str, other: str) -> None:
+        super().__init__(problem, 'give times with a smaller step, a tolerance, or method="strang"')
+        self.limit, self.other = limit, other
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,35 +123,6 @@ def _together(first: Joint | None, second: Joint) -> Joint:
     return Joint((*first.names, *second.names), values, covariance, (*first.units, *second.units))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Check:
-    """The errors of a trajectory over amplitude and greatest velocity, measured against a reference."""
-
-    reference: Trajectory
-    words: str
-    error: float
-    velocity_error: float
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Simulation:
-    """A solved problem, its measured error if that was requested, and the time spent on choosing method and step."""
-
-    solution: Solution
-    check: Check | None = None
-    choosing_s: float = 0.0
-
-    @property
-    def problem(self) -> Problem:
-        """The equation and its start."""
-        return self.solution.problem
-
-    @property
-    def trajectory(self) -> Trajectory:
-        """The solved motion."""
-        return self.solution.trajectory
-
-
 def count_of(seconds: float, spacing_s: float) -> int:
     """Return the number of spacings in a run; refuse none, and more than the memory of a machine holds."""
     count = round(seconds / spacing_s) if spacing_s > 0 else 0
@@ -162,33 +169,123 @@ def default_tolerance(band: Band | None) -> float:
     return float(f"{min(max(BAND_SHARE * band.relative_u, DEFAULT_TOLERANCE), LARGEST_DEFAULT):.1g}")
 
 
-def instability(problem: Problem, method: str, step_s: float | None) -> tuple[str, str]:
-    """Say what is wrong with a step beyond the limit of its method, and return the limit, s, rounded down.
-
-    Both are empty if the step is stable; the limit is empty too if no step is. Without a step it may be as short as
-    needed.
-    """
-    integrator = None if method == "auto" else get_integrator(method)
-    limit = math.inf if integrator is None else integrator.stable_step(problem)
-    if integrator is None or (limit > 0.0 and (step_s is None or step_s <= limit)):
-        return "", ""
+def demand_stable(problem: Problem, method: str | Integrator, step_s: float | None) -> None:
+    """Raise UnstableStep if a step is beyond the limit of its method; without a step it may be as short as needed."""
+    if method == "auto":
+        return
+    integrator = get_integrator(method) if isinstance(method, str) else method
+    limit = integrator.stable_step(problem)
+    if limit > 0.0 and (step_s is None or step_s <= limit):
+        return
     growth, rounded = "it grows at any step without damping", ""
     if limit > 0.0:
         power = 10.0 ** (math.floor(math.log10(limit)) - 2)
         rounded = f"{math.floor(limit / power) * power:.3g}"
         growth = f"its limit here is {rounded} s"
     step = "a step" if step_s is None else f"a step of {step_s:g} s"
-    return f"{integrator.words} is unstable with {step}: {growth}", rounded
+    other = "auto" if integrator is STRANG else STRANG.name
+    other += "" if math.isfinite(STRANG.stable_step(problem)) else ", which has no limit"
+    raise UnstableStep(f"{integrator.words} is unstable with {step}: {growth}", rounded, other)
 
 
-def simulated(
-    problem: Problem, method: str, spacing_s: float, count: int, tolerance: float | None, *, check: bool
-) -> Simulation:
-    """Solve a motion, and measure its error if that is requested."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Check:
+    """The errors of a trajectory over amplitude and greatest velocity, measured against a reference."""
+
+    reference: Trajectory
+    words: str
+    error: float
+    velocity_error: float
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """The solved motion of a scene.
+
+    ``where`` is the path of the scene or run. ``band`` comes from the uncertain inputs, and ``of_band`` says how, or
+    why there is none. ``tolerance`` is that of the solution, whose method and step took ``choosing_s`` to choose. The
+    error was measured if that was requested, and the run compared if there is one.
+    """
+
+    where: str
+    ready: Prepared
+    band: Band | None
+    of_band: str
+    tolerance: float | None
+    solution: Solution
+    choosing_s: float
+    check: Check | None
+    against: Against | None
+
+    @property
+    def problem(self) -> Problem:
+        """The equation and its start."""
+        return self.solution.problem
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """The solved motion."""
+        return self.solution.trajectory
+
+    @property
+    def count(self) -> int:
+        """The number of spacings."""
+        return len(self.trajectory.y) - 1
+
+    @cached_property
+    def effects(self) -> tuple[Effect, ...]:
+        """The effects that act on the motion, with their sizes."""
+        ready = self.ready
+        return simulated_effects(ready.stated, ready.problem, self.trajectory.spacing_s * self.count, ready.drag)
+
+    @cached_property
+    def growths(self) -> tuple[Growth, ...]:
+        """The growth by both Euler methods with a step of this spacing."""
+        turn = self.problem.equation.angular_frequency_per_s * self.trajectory.spacing_s
+        period = max(1, round(2.0 * math.pi / turn))
+        rows = []
+        for name, words in EULERS:
+            integrator = get_integrator(name)
+            predicted = math.sqrt(1.0 + turn * turn) if name == "forward-euler" else 1.0
+            measured = _measured_growth(self, integrator, period)
+            rows.append(Growth(name, words, predicted, measured, integrator.stable_step(self.problem)))
+        return tuple(rows)
+
+
+def simulated(scene: Scene, options: SimulationOptions, run: Run | None = None, where: str = "") -> Simulation:
+    """Solve the motion of a scene; one of a run is completed from the run, and the motion compared with it.
+
+    Raises SceneError or DynamicsError if the scene describes no motion, UnstableStep, and DynamicsError if the method
+    cannot keep the tolerance.
+    """
+    method, spacing_s, analysis = options.method, options.spacing_s, None if run is None else run.analysis
+    longest_s = options.seconds or DEFAULT_S
+    if analysis is not None:
+        longest_s = max(options.seconds or 0.0, duration_s(analysis))
+    count = count_of(options.seconds or longest_s, spacing_s)
+    ready = prepare(scene, longest_s, analysis=analysis, where=where or "scene")
+    if run is not None:
+        LOG.info(f"from {run.loaded.path}: {', '.join(ready.from_run)}")
+    band, of_band = band_of(ready, longest_s)
+    tolerance = default_tolerance(band) if options.tolerance is None and method == "auto" else options.tolerance
+    if not options.force:
+        demand_stable(ready.problem, method, spacing_s if options.tolerance is None else None)
     started = time.perf_counter()
-    solution = solve(problem, method, spacing_s, count, tolerance)
-    choosing_s = time.perf_counter() - started - solution.running_s
-    return Simulation(solution, _checked(problem, solution, spacing_s, count) if check else None, choosing_s)
+    try:
+        solution = solve(ready.problem, method, spacing_s, count, tolerance)
+        choosing_s = time.perf_counter() - started - solution.running_s
+        check = _checked(ready.problem, solution, spacing_s, count) if options.check else None
+    except DynamicsError as error:
+        raise DynamicsError(error.problem, error.remedy, where=f"{where}: " if where else "") from error
+    against = None
+    if analysis is not None:
+        # The step of ``auto`` is short enough for interpolation.
+        omega = ready.problem.equation.angular_frequency_per_s
+        step_s = min(spacing_s, 1.0 / (FINE * omega)) if method == "auto" else spacing_s
+        beside = count_of(step_s * max(1, math.ceil(duration_s(analysis) / step_s)), step_s)
+        trajectory = solve(ready.problem, method, step_s, beside, tolerance).trajectory
+        against = compare_with_run(analysis, trajectory, band, ready.values())
+    return Simulation(where, ready, band, of_band, tolerance, solution, choosing_s, check, against)
 
 
 def _checked(problem: Problem, solution: Solution, spacing_s: float, count: int) -> Check:
@@ -312,22 +409,9 @@ class Growth:
     fails_above_s: float
 
 
-def growths(problem: Problem, step_s: float, count: int) -> tuple[Growth, ...]:
-    """Return the growth by both Euler methods with a step."""
-    turn = problem.equation.angular_frequency_per_s * step_s
-    period = max(1, round(2.0 * math.pi / turn))
-    steps = min(10 * period, count)
-    rows = []
-    for name, words in EULERS:
-        integrator = get_integrator(name)
-        predicted = math.sqrt(1.0 + turn * turn) if name == "forward-euler" else 1.0
-        measured = _measured_growth(problem, integrator, step_s, steps, period)
-        rows.append(Growth(name, words, predicted, measured, integrator.stable_step(problem)))
-    return tuple(rows)
-
-
-def _measured_growth(problem: Problem, integrator: Integrator, step_s: float, steps: int, period: int) -> float | None:
+def _measured_growth(solved: Simulation, integrator: Integrator, period: int) -> float | None:
     """Return the mean growth of the amplitude a step beyond that of the exact motion, from one period to the last."""
+    problem, step_s, steps = solved.problem, solved.trajectory.spacing_s, min(10 * period, solved.count)
     if steps < 2 * period or problem.amplitude_m() == 0.0:
         return None
     try:
@@ -341,16 +425,14 @@ def _measured_growth(problem: Problem, integrator: Integrator, step_s: float, st
     return math.exp(grown) if math.isfinite(grown) and grown < 1.0 else None
 
 
-def summary(
-    solved: Simulation, effects: Sequence[Effect], tolerance: float | None, band: Band | None
-) -> dict[str, Any]:
-    """Return a simulation as the JSON of ``springmass simulate``, compared with no run."""
-    solution, check = solved.solution, solved.check
+def summary(solved: Simulation) -> dict[str, Any]:
+    """Return a simulation as the JSON of ``springmass simulate``."""
+    solution, check, band = solved.solution, solved.check, solved.band
     content = {
         "schema": 1,
         "method": solution.integrator.name,
         "step_s": solution.step_s,
-        "steps": solution.parts * (len(solved.trajectory.y) - 1),
+        "steps": solution.parts * solved.count,
         "samples": len(solved.trajectory.y),
         "spacing_s": solved.trajectory.spacing_s,
         "stable_step_s": solution.integrator.stable_step(solution.problem),
@@ -360,15 +442,16 @@ def summary(
         "measured_error": None if check is None else check.error,
         "measured_velocity_error": None if check is None else check.velocity_error,
         "reference": None if check is None else check.words,
-        "tolerance": tolerance,
+        "tolerance": solved.tolerance,
         "choosing_s": solved.choosing_s,
         "running_s": solution.running_s,
         "amplitude_m": solved.problem.amplitude_m(),
         "prediction": prediction(solved),
         "equation": picked(solved.problem.equation, solved.problem.equation.__slots__),
-        "effects": [picked(each, ("name", "predicted", "measured", "unit", "included", "why")) for each in effects],
-        "against": None,
+        "effects": [picked(each, EFFECT_COLUMNS) for each in solved.effects],
+        "against": None if solved.against is None else solved.against.summary(),
         "band": None if band is None else _band_summary(band, solved.trajectory.t),
+        "growth": [picked(each, GROWTH_COLUMNS) for each in solved.growths],
     }
     return {name: plain(value) for name, value in content.items()}
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import os
-import queue
 import select
 import sys
 import threading
 from collections.abc import Iterator
 
+from springmass.session.session import Marks
 from springmass.stops import STOPS
 
 try:
@@ -19,12 +19,11 @@ except ImportError:  # on Windows, only a line with Enter is a mark
     termios = None  # type: ignore[assignment]
 
 PLAIN_MARK = "mark"
-Marks = queue.SimpleQueue[str]
 
 
 @contextlib.contextmanager
-def marks_by_keys(*, watched: bool) -> Iterator[Marks | None]:
-    """Yield the queue of marks typed during a recording; None if nothing can be typed.
+def marks_by_keys(marks: Marks, *, watched: bool) -> Iterator[bool]:
+    """Put what is typed during a recording into the queue of marks; yield whether anything can be typed.
 
     If stderr is ``watched`` on a terminal, keys are read singly; otherwise, each line with Enter is a mark. The
     terminal still handles Ctrl-C and Ctrl-Z. A program in the background does not access the terminal, because this
@@ -32,24 +31,27 @@ def marks_by_keys(*, watched: bool) -> Iterator[Marks | None]:
     """
     descriptor = _foreground()
     if descriptor is None:
-        yield None
+        yield False
         return
-    marks: Marks = queue.SimpleQueue()
     if termios is None or not watched:
         threading.Thread(target=_lines, args=(marks,), name="springmass-marks", daemon=True).start()
-        yield marks
+        yield True
         return
     before = termios.tcgetattr(descriptor)
-    STOPS.leaving.append(lambda: termios.tcsetattr(descriptor, termios.TCSANOW, before))
     wake, end = os.pipe()
     thread = threading.Thread(target=_keys, args=(descriptor, wake, marks), name="springmass-marks", daemon=True)
+
+    def restore() -> None:
+        termios.tcsetattr(descriptor, termios.TCSANOW, before)
+
     try:
-        tty.setcbreak(descriptor, termios.TCSANOW)
-        thread.start()
-        yield marks
+        with STOPS.leaving(restore):
+            tty.setcbreak(descriptor, termios.TCSANOW)
+            thread.start()
+            yield True
     finally:
         with contextlib.suppress(termios.error):  # a closed terminal has no modes
-            termios.tcsetattr(descriptor, termios.TCSANOW, before)
+            restore()
         os.close(end)
         if thread.ident is not None:
             thread.join()

@@ -13,7 +13,7 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import Classic
 from pipeline.results.compare import Comparison
 from springmass.comparing.reported import Reported
-from springmass.result.table1 import table_rows
+from springmass.result.table1 import rows_and_needs
 from springmass.terminal.style import PLAIN, TerminalStyle, concise, shown
 from springmass.typeset import count
 
@@ -154,7 +154,7 @@ def text_table(names: Sequence[str], runs: Sequence[Analysis], style: TerminalSt
     Names that are wider than their column are shortened. If the runs do not fit side by side, the uncertainty is given
     as digits in parentheses.
     """
-    rows = table_rows(runs, missing=True)
+    rows = rows_and_needs(runs)
     symbols = [row.on_screen if style.unicode else row.symbol for row in rows]
     left = max([len("quantity"), *(len(row.quantity) for row in rows)])
     room = style.width - max([len("symbol"), *map(len, symbols)]) - 4

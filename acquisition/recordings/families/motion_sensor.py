@@ -24,7 +24,7 @@ from acquisition.recordings.reading import READ_DEFAULTS, ReadOptions
 from acquisition.recordings.recording import FormatIssue, Original, Recording, Survey
 from acquisition.recordings.sampling.flags import IRREGULAR, UNREAD_FLAGS, time_flags
 from acquisition.recordings.sampling.timing import median
-from acquisition.recordings.tables.channel import check_values, read_channel
+from acquisition.recordings.tables.channel import check_lengths, read_channel
 from acquisition.recordings.tables.format import ColumnFormat, text_format
 from acquisition.recordings.tables.headings import Heading
 from acquisition.recordings.tables.layout import columns_of, find_table, runs_forward
@@ -91,6 +91,8 @@ def _headings(quantity: str, unit: str, error: bool) -> list[Heading]:
 def _tables(path: str, data: bytes) -> list[Table]:
     """Read the table; a row that lacks a number, or has one too many, is damaged as a whole."""
     (table,) = _TEXT.tables(path, data)
+    first, *others = table.columns
+    table = replace(table, columns=(replace(first, differences=first.name == "velocity"), *others))
     if table.lines is None:
         return [table]
     *cells, beyond = (column.of_size(table.lines.rows).forms for column in table.beside)
@@ -117,7 +119,7 @@ class MotionSensor(ColumnFormat):
     def read(self, path: str, data: bytes, reading: ReadOptions = READ_DEFAULTS) -> Recording:
         """Read one file, either of position or of velocity; see :class:`springmass.extend.Format`."""
         samples = self._samples(path, data, reading)
-        if samples.column.name == "velocity":
+        if samples.column.differences:
             return samples.recording(self.name, data, *_summed_up(samples))
         return samples.recording(self.name, data, Block(0, samples.t, samples.value, samples.flags))
 
@@ -137,8 +139,7 @@ class MotionSensor(ColumnFormat):
     def _samples(self, path: str, data: bytes, answers: ReadOptions) -> Samples:
         """Read the samples of a file, m or m/s, with the error that it states."""
         tables = self.tables(path, data)
-        velocity = tables[0].columns[0].name == "velocity"
-        samples = read_channel(path, tables, answers, difference=velocity)
+        samples = read_channel(path, tables, answers)
         for column in samples.table.beside[2:-1]:
             errors = scaled(column.values, column.decimals, samples.measured.power)
             errors = errors[np.isfinite(errors)]
@@ -149,7 +150,7 @@ class MotionSensor(ColumnFormat):
                 message = f"the error column is a constant {size}: a stated value, not the noise"
                 trap = FormatIssue("stated_error_is_not_noise", message)
                 samples = replace(samples, traps=(*samples.traps, trap))
-        return samples if velocity else check_values(samples, length=True)
+        return samples if samples.column.differences else check_lengths(samples)
 
 
 _TEXT = text_format("motion-sensor", "MotionSensor.vi text: position, velocity, or one of each", header)

@@ -135,31 +135,27 @@ def sample_traps(flags: U8, t: F8, rate_hz: float, lines: I8 | None) -> Iterator
         yield FormatIssue("missing_samples", message, lost, line_of(lines, int(gaps[0])))
 
 
-def value_traps(
-    distance: F8, flags: U8, resolution: float, lines: I8 | None, *, length: bool
-) -> tuple[float, tuple[FormatIssue, ...]]:
+def length_traps(distance: F8, flags: U8, resolution: float, lines: I8 | None) -> tuple[float, tuple[FormatIssue, ...]]:
     """Find zeros that fill the end, a lost target, and distances rounded more coarsely than printed.
 
     Zeros that fill the end become NaN and MISSING, and samples of a lost target FALSE_ECHO, in place. ``resolution``
-    is the last printed digit. If the values are no lengths, there is no lost target, and zero is a normal reading.
-    Return the step of which all values are multiples, and the remarks.
+    is the last printed digit. Return the step of which all values are multiples, and the remarks.
     """
     traps = []
-    if length and (tail := _zero_tail(distance)) < distance.size:
+    if (tail := _zero_tail(distance)) < distance.size:
         count = distance.size - tail
         distance[tail:] = np.nan
         flags[tail:] |= Flag.MISSING.value
         message = f"the last {count} distances are exactly 0, which no rangefinder reads; kept as missing samples"
         traps.append(FormatIssue("zero_filled_tail", message, count, line_of(lines, tail)))
-    far = _far(distance, resolution) if length else np.empty(0, np.int64)
-    if far.size:
+    if (far := _far(distance, resolution)).size:
         flags[far] |= Flag.FALSE_ECHO.value
         low, high = float(np.min(distance[far])), float(np.max(distance[far]))
         distances = f"{far.size} distances of {low:.3g} to {high:.3g} m are far from all others"
         message = f"{distances}: the target was lost; kept and flagged"
         traps.append(FormatIssue("lost_target", message, int(far.size), line_of(lines, int(far[0]))))
-    quantum = _common_step(distance, resolution)
-    if length and quantum >= _COARSE_M * (1 - 1e-9):
+    quantum = common_step(distance, resolution)
+    if quantum >= _COARSE_M * (1 - 1e-9):
         message = f"distances are multiples of {quantum * 1e3:g} mm: smaller motion is lost by rounding"
         traps.append(FormatIssue("quantised", message, distance.size))
     return quantum, tuple(traps)
@@ -193,7 +189,7 @@ def _far(distance: F8, resolution: float) -> I8:
     return np.flatnonzero(deviation >= ordered[first + gaps[0]]) if gaps.size else no_samples
 
 
-def _common_step(distance: F8, resolution: float) -> float:
+def common_step(distance: F8, resolution: float) -> float:
     """Return the largest step of which all distances are multiples: the last printed digit or a multiple of it."""
     if not resolution > 0 or distance.size < _FEWEST:
         return resolution

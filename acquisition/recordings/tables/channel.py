@@ -14,12 +14,12 @@ from acquisition.recordings.reading import ReadOptions
 from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.sampling.flags import (
     UNREAD_FLAGS,
+    length_traps,
     line_of,
     place,
     row_traps,
     sample_traps,
     time_flags,
-    value_traps,
 )
 from acquisition.recordings.sampling.timing import ChannelRows, find_timing
 from acquisition.recordings.tables.choose import choose_channel, measure
@@ -33,17 +33,14 @@ _LONGEST_S = 1e10
 _HOUR_S, _DAY_S, _MOST_JUMPS, _SLOWEST_HZ = 3600.0, 86400.0, 10, 0.01
 
 
-def read_channel(path: str, tables: Sequence[Table], answers: ReadOptions, difference: bool = False) -> Samples:
-    """Choose a channel and read its samples.
-
-    ``difference`` says that each value is the difference from the row before, so that the first may be absent.
-    """
+def read_channel(path: str, tables: Sequence[Table], answers: ReadOptions) -> Samples:
+    """Choose a channel and read its samples."""
     if (rate_hz := answers.rate_hz) is not None and not (math.isfinite(rate_hz) and rate_hz > 0):
         raise FormatError(path, f"rate_hz must be a positive number, got {rate_hz!r}", "give the rate in hertz")
     table, column = choose_channel(path, names_apart(tables), answers)
     measured, traps = measure(path, column, answers.unit)
     rows = rows_of(path, table, column, measured)
-    samples = read_samples(path, rows, table, column, measured, rate_hz, difference)
+    samples = read_samples(path, rows, table, column, measured, rate_hz)
     return replace(samples, traps=(*table.traps, *traps, *samples.traps))
 
 
@@ -54,7 +51,6 @@ def read_samples(
     column: Column,
     measured: Measure,
     rate_hz: float | None = None,
-    difference: bool = False,
 ) -> Samples:
     """Return the samples in the rows of a channel."""
     timing = find_timing(path, rows, table.formula, rate_hz)
@@ -71,7 +67,7 @@ def read_samples(
     flags = time_flags(t, 1.0 / timing.rate_hz)
     flags[np.isnan(value)] |= Flag.MISSING.value
     flags[unread[timed]] |= UNREAD_FLAGS
-    if difference and not unread[0] and np.isnan(value[0]):
+    if column.differences and not unread[0] and np.isnan(value[0]):
         flags[0] &= ~np.uint8(Flag.MISSING)
     issues += _jumps(t, timing.rate_hz, lines)
     zeros = table.lines.zeros if table.lines else 0
@@ -97,9 +93,9 @@ def _jumps(t: F8, rate_hz: float, lines: I8 | None) -> list[FormatIssue]:
     return traps
 
 
-def check_values(samples: Samples, *, length: bool) -> Samples:
-    """Return samples with their quantum and with what is peculiar in their values; see :func:`value_traps`."""
-    quantum, issues = value_traps(samples.value, samples.flags, samples.resolution, samples.lines, length=length)
+def check_lengths(samples: Samples) -> Samples:
+    """Return lengths with their quantum and with what is peculiar in them; see :func:`length_traps`."""
+    quantum, issues = length_traps(samples.value, samples.flags, samples.resolution, samples.lines)
     return replace(samples, quantum=quantum or None, traps=(*samples.traps, *issues))
 
 

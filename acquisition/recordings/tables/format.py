@@ -10,7 +10,8 @@ from acquisition.block import Block
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.reading import READ_DEFAULTS, ReadOptions
 from acquisition.recordings.recording import FormatIssue, Recording, Survey
-from acquisition.recordings.tables.channel import check_values, read_channel, read_samples, rows_of
+from acquisition.recordings.sampling.flags import common_step
+from acquisition.recordings.tables.channel import check_lengths, read_channel, read_samples, rows_of
 from acquisition.recordings.tables.rows import read_rows
 from acquisition.recordings.tables.table import Column, Header, Table, TableFacts, names_apart, set_back, side_by_side
 from acquisition.recordings.tables.text import Text, head_lines, text_of
@@ -50,8 +51,11 @@ class ColumnFormat:
     def read(self, path: str, data: bytes, reading: ReadOptions = READ_DEFAULTS) -> Recording:
         """Read one channel of one run; see :class:`springmass.extend.Format`."""
         samples = read_channel(path, self._runs(path, data), reading)
-        length = samples.measured.quantity == "length" and (samples.column.is_length or not samples.column.unit)
-        samples, measured = check_values(samples, length=length), samples.measured
+        measured, column = samples.measured, samples.column
+        if measured.quantity == "length" and (column.is_length or not column.unit):
+            samples = check_lengths(samples)
+        else:
+            samples = replace(samples, quantum=common_step(samples.value, samples.resolution) or None)
         block = Block(0, samples.t, samples.value, samples.flags, quantity=measured.quantity, unit=measured.si)
         return samples.recording(self.name, data, block)
 

@@ -38,6 +38,8 @@ class Column:
         -3 for a cell that is not a number. None for binary numbers.
     aside : bool
         Whether it is an auxiliary column (row numbers, an uncertainty), which is read only if the user names it.
+    differences : bool
+        Whether each value is the difference from the row before, so that the first may be absent.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Column:
     values: F8
     decimals: I1 | None = None
     aside: bool = False
+    differences: bool = False
 
     @property
     def forms(self) -> I1:

@@ -13,6 +13,7 @@ from scipy.optimize import least_squares
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.compare import Comparison, SpringRun, compare_springs
 from pipeline.results.course import agreement
+from pipeline.results.masses import hooke
 
 
 def massless(runs: Sequence[SpringRun], mass_correlation: float = 0.0) -> Comparison:
@@ -127,3 +128,25 @@ def test_scatter_within_and_between_is_what_was_put_in():
     assert found.between == pytest.approx(0.05, rel=0.1)
     assert abs(found.mean.value - 14.0) < 3.0 * found.mean.u
     assert found.mean.u == pytest.approx(0.05 / 20.0, rel=0.15)
+
+
+@pytest.mark.parametrize("count", [2, 3, 5])
+def test_two_u_of_a_common_mean_cover_the_truth_of_few_benches(count: int) -> None:
+    """Over 300 courses of benches that differ, 95.45 % intervals hold as often as that, within 3.3 deviations."""
+    rng, held = np.random.default_rng(count), 0
+    for _ in range(300):
+        benches = np.repeat(np.arange(count), 3)
+        values = 14.0 + 0.3 * rng.standard_normal(count)[benches] + 0.05 * rng.standard_normal(benches.size)
+        found = agreement("k", "", [Estimate(float(x), 0.05, "N/m") for x in values], [str(b) for b in benches])
+        held += abs(found.mean.value - 14.0) <= 2.0 * found.mean.u
+    assert held >= 300 * (0.9545 - 3.3 * math.sqrt(0.9545 * 0.0455 / 300))
+
+
+@pytest.mark.parametrize("count", [3, 4, 5])
+def test_equal_constants_hardly_ever_disagree_by_hookes_law(count: int) -> None:
+    """Of 500 sets of three to five masses E_n is above 1 in one in twenty at most, within 3.3 deviations."""
+    rng, mass_kg, apart = np.random.default_rng(count), np.linspace(0.1, 0.3, count), 0
+    for _ in range(500):
+        position_m = 0.3 + rng.normal(9.81, 0.015) / 14.0 * mass_kg + 1e-3 * rng.standard_normal(count)
+        apart += hooke(mass_kg, position_m).normalised_error(Estimate(rng.normal(14.0, 0.01), 0.01, "N/m")) > 1.0
+    assert apart <= 500 * (0.0455 + 3.3 * math.sqrt(0.9545 * 0.0455 / 500))

@@ -10,7 +10,6 @@ import pytest
 
 import springmass as sm
 from acquisition.block import Block, Flag, SourceInfo
-from acquisition.buffer import SampleBuffer
 from springmass.loading.options import AnalysisOptions
 from springmass.runs.rolling import NotYet, Rolling, live_run
 from springmass.runs.run import Run
@@ -38,7 +37,7 @@ def swing(seconds: float) -> Block:
 
 def rolling(most: int | None = None, share: float = 1.0) -> Rolling:
     """Return the rolling analysis of a live sensor on a bench without a scene."""
-    return Rolling(lambda block: live_run(block, INFO, None, SENSOR, FAST), SampleBuffer(most), share=share)
+    return Rolling(lambda block: live_run(block, INFO, None, SENSOR, FAST), share=share, most=most)
 
 
 @pytest.mark.parametrize("most", [None, 1000])
@@ -67,7 +66,7 @@ def test_it_takes_no_more_than_its_share() -> None:
         analyses += 1
         return live_run(block, INFO, None, SENSOR, FAST)
 
-    live = Rolling(run_of, SampleBuffer(), share=1e-3, now=lambda: now_s)
+    live = Rolling(run_of, share=1e-3, now=lambda: now_s)
     whole = swing(20.0)
     for second in range(10):
         live.push(whole[100 * second : 100 * second + 100])
@@ -83,7 +82,7 @@ def test_it_takes_no_more_than_its_share() -> None:
 
 def test_memory_is_flat_over_an_hour() -> None:
     """360,000 samples pushed allocate no more than the window holds, and leave the last window."""
-    held, minute = SampleBuffer(1000), swing(60.0)[:5000]
+    held, minute = rolling(1000), swing(60.0)[:5000]
     tracemalloc.start()
     for _ in range(72):
         for start in range(0, 5000, 500):
@@ -91,8 +90,8 @@ def test_memory_is_flat_over_an_hour() -> None:
     grown, _ = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert grown < 1_000_000  # all samples are 9 MB
-    np.testing.assert_array_equal(held.block().t, minute.t[-1000:])
-    np.testing.assert_array_equal(held.block().distance, minute.distance[-1000:])
+    np.testing.assert_array_equal(held.run().loaded.samples.t, minute.t[-1000:])
+    np.testing.assert_array_equal(held.run().loaded.samples.distance, minute.distance[-1000:])
 
 
 NOTHING = np.full(1000, np.nan)

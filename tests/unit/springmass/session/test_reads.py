@@ -113,14 +113,14 @@ def test_a_defect_of_a_decoder_costs_no_byte_and_ends_nothing(monkeypatch: pytes
     tee, each = Tee([chain()], failures), chain()
     log = started(tee, [each], 0)
     events: list[str] = []
-    failures.tell = lambda event: events.append(f"{event.kind} {event.facts['error']} {event.facts['why']}")
 
     def break_down(host_ns: int, data: bytes) -> Readings:
         raise RuntimeError("no such form")
 
     monkeypatch.setattr(each, "decoder", SimpleNamespace(feed=break_down))
-    for i in range(5):
-        tee.reads([(0, i, b"x")])
+    with failures.told_to(lambda e: events.append(f"{e.kind} {e.facts['error']} {e.facts['why']}")):
+        for i in range(5):
+            tee.reads([(0, i, b"x")])
     assert log.taken == [(0, i, b"x") for i in range(5)]
     assert events == ["decoder_failed RuntimeError no such form"]
     assert list(failures.counts.values()) == [5]
