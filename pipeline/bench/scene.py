@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 from pipeline.bench.air import saturation_pressure
+from pipeline.bench.law_names import law_names
 from pipeline.errors import SceneError
 from pipeline.numerics.estimate import Estimate
-from pipeline.registry.laws import law_names
 
 TakenT = TypeVar("TakenT")
 KeptT = TypeVar("KeptT")

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from pipeline.analyse import Analysis
-from pipeline.registry.quantities import INPUTS
+from pipeline.quantities import INPUTS
 from springmass.result.advice import by_harm, lab_report_line
 from springmass.result.budget_tables import budgets_of
 from springmass.result.table1 import table_rows
