@@ -157,6 +157,8 @@ class SourceInfo:
         Origin of the sample times; "nominal" times were not measured: they are row numbers divided by the rate.
     stated_error_m : float or None
         Error of a distance as stated in the recording, m; None if not stated. It may differ from the noise.
+    u_rate : float or None
+        Relative standard uncertainty of the rate of times that follow from arrivals, besides that of their clock.
     """
 
     kind: SourceKind
@@ -166,6 +168,7 @@ class SourceInfo:
     quantum_m: float | None = None
     clock: ClockKind = "nominal"
     stated_error_m: float | None = None
+    u_rate: float | None = None
 
 
 class Source(Protocol):

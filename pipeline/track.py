@@ -12,6 +12,8 @@ from pipeline.errors import TrackError
 
 F8 = NDArray[np.float64]
 U8 = NDArray[np.uint8]
+C16 = NDArray[np.complex128]
+Bools = NDArray[np.bool_]
 
 UNITS = {
     "length": "m",
@@ -68,6 +70,7 @@ class Track:
     # Samples that came in bursts after a stall, later than jitter explains; the comparison of the clocks excludes them.
     held_samples: int = 0
     longest_stall_s: float = 0.0
+    u_rate: float = 0.0  # relative standard uncertainty of the rate of times that follow from arrivals
     compared_s: float | None = None  # duration of the comparison of the clocks; None for the whole recording
     speed_of_sound_m_per_s: float | None = None  # with which echo times were converted to distances
     sonic: bool = False  # whether the distances are those of echoes, whose scale changes with the air

@@ -18,6 +18,7 @@ from acquisition.decoders.sensor import Sensor
 from acquisition.errors import SensorError
 from acquisition.live.calibration import Calibration
 from acquisition.live.clock_fit import COUNTER_PPM, ClockSamples
+from acquisition.live.line_times import Arrivals, settled
 from acquisition.live.timebase import Timebase, demand_within
 from acquisition.readings import NO_READINGS, Reading, Readings, carried
 
@@ -62,6 +63,7 @@ class SensorChain:
         self._travel_s = 0.0  # one-way travel time of the last ping, from the sensor to the bob
         self._at_reflection = False
         self._clock = ClockSamples()
+        self._arrivals: Arrivals | None = None
         self._temperatures: Counter[float] = Counter()  # number of readings by temperature, degC
         self._held: list[Reading] = []
         self._breaks: list[int] = []  # indices of the held readings that follow an interruption
@@ -93,9 +95,14 @@ class SensorChain:
         """
         held, self._held = Readings(self._held), []
         stamps, t, flags = held.host_ns, np.empty(len(held)), np.zeros(len(held), np.uint8)
-        for row, reading in enumerate(held):
-            t[row], flags[row] = self.timebase.push(reading)
-        self._clock.take(self._next, t, stamps)
+        if not self._next and held and self.family.poll is None and max(held[0].device_us, held[0].sequence) < 0:
+            self._arrivals = Arrivals(self.timebase.rate_hz)
+        if self._arrivals is not None:
+            t, flags = self._arrivals.push(stamps)
+        else:
+            for row, reading in enumerate(held):
+                t[row], flags[row] = self.timebase.push(reading)
+            self._clock.take(self._next, t, stamps)
         self._temperatures.update(
             round(row.temperature_c, 2) for row in held if ROOM_C[0] < row.temperature_c < ROOM_C[1]
         )
@@ -109,6 +116,21 @@ class SensorChain:
         self._breaks = [0] if len(held) in self._breaks else []
         first, self._next = self._next, self._next + len(held)
         return Block(first, t, distance, flags, stamps)
+
+    @property
+    def awaits_end(self) -> bool:
+        """Whether the times are those of arrival, which :meth:`settle` improves once all samples are there."""
+        return self._arrivals is not None
+
+    def settle(self, block: Block) -> Block:
+        """Return all samples of a run with the times that they show together, if they had only those of arrival."""
+        if self._arrivals is None or not len(block):
+            return block
+        block, self._arrivals.clock = settled(block)
+        lost = block.flags & GAP_BEFORE != 0
+        for row in (np.flatnonzero(lost[1:]) + 1).tolist():
+            self.timebase.note_gap(row, float(block.t[row] - block.t[row - 1]), self._arrivals.clock.rate_hz)
+        return block
 
     def _travel_times(self, travel_s: F8) -> F8:
         """Return the (n,) times from ping to reflection, s; without an echo, the time of the previous reading is used.
@@ -140,7 +162,8 @@ class SensorChain:
         """Return the description of the source; its kind of clock is determined by the first reading."""
         rate_hz, clock = self.timebase.rate_hz, self.timebase.clock
         quantum_m = self.decoder.resolution_m or self.family.resolution_m
-        return SourceInfo(kind, name, rate_hz, quantum_m=quantum_m, clock=clock)
+        info = SourceInfo(kind, name, rate_hz, quantum_m=quantum_m, clock=clock)
+        return info if self._arrivals is None else self._arrivals.clock.described(info)
 
     def report(self) -> dict[str, Any]:
         """Return faults, gaps, temperature and the clock comparison as plain data, for the provenance of the run."""
@@ -158,6 +181,7 @@ class SensorChain:
                 "moment": "reflection" if self._at_reflection else "reading",
                 "limit_ppm": self.clock_ppm,
                 **self._clock.fit().to_mapping(),
+                **({} if self._arrivals is None else {"lines": self._arrivals.clock.to_mapping()}),
             },
         }
 

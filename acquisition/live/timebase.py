@@ -2,7 +2,7 @@
 
 Host times are too imprecise for 100 Hz: under load, readings sent every 10 ms arrive in steps of 23 to 77 ms. So the
 clock of the sensor is used if it is sent, and :mod:`acquisition.live.clock_fit` estimates its rate error from the host
-times.
+times. Lines without a clock have the times that :mod:`acquisition.live.line_times` finds.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ class Timebase:
             flag = int(Flag.NON_MONOTONIC_TIME)
         elif restarted or step_s > longest_s:
             flag = int(Flag.GAP_BEFORE)
-            self._note_gap(Gap(self._count, step_s, max(round(step_s * self.rate_hz) - 1, 0)))
+            self.note_gap(self._count, step_s, self.rate_hz)
         self._latest_s = max(self._latest_s, t)
         self._count += 1
         return t, flag
@@ -105,7 +105,9 @@ class Timebase:
             return reading.sequence, self._period_s
         return reading.host_ns, NANO
 
-    def _note_gap(self, gap: Gap) -> None:
+    def note_gap(self, index: int, length_s: float, rate_hz: float) -> None:
+        """List a gap before a reading at the rate of the readings, or count it if there are many."""
+        gap = Gap(index, length_s, max(round(length_s * rate_hz) - 1, 0))
         if len(self.gaps) < KEPT_GAPS:
             self.gaps.append(gap)
             return

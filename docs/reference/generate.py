@@ -12,7 +12,7 @@ from pathlib import Path
 from cyclopts import Group
 from cyclopts.argument import Argument
 
-from pipeline.findings.finding import RANK, Kind, kinds, usual_advice
+from pipeline.findings.finding import RANK, FindingKind, kinds, usual_advice
 from springmass.commands import COMMANDS, app
 from springmass.commands.options import HOW_READ, THE_PAGE
 
@@ -124,7 +124,7 @@ def updated(page: str) -> str:
 
 def findings_page() -> str:
     """Return the page of findings, grouped by symptom and the gravest first."""
-    groups: dict[str, list[tuple[str, Kind]]] = {}
+    groups: dict[str, list[tuple[str, FindingKind]]] = {}
     for code, kind in kinds().items():
         groups.setdefault(kind.symptom, []).append((code, kind))
     parts = [HEAD]

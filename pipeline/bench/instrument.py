@@ -52,7 +52,7 @@ class Instrument:
         >>> print(Instrument.of(track).clock_rate)
         1.000000 +- 0.000029
         """
-        for name, u in (("u_scale", track.u_scale), ("u_offset_m", track.u_offset_m)):
+        for name, u in (("u_scale", track.u_scale), ("u_offset_m", track.u_offset_m), ("u_rate", track.u_rate)):
             if not (math.isfinite(u) and u >= 0):
                 raise TrackError(
                     f"{name} must be finite and not negative, got {u:g}", "leave it out where it is not known"
@@ -62,7 +62,16 @@ class Instrument:
                 raise TrackError(f"{name} must be finite and not negative, got {limit:g}", "leave it out")
         rate, words, refused = _rate(track)
         sound, sonic = track.speed_of_sound_m_per_s, track.sonic or track.speed_of_sound_m_per_s is not None
-        return cls(track.clock, rate, words, sound, track.u_scale, track.u_offset_m, sonic, refused)
+        return cls(
+            clock=track.clock,
+            clock_rate=rate,
+            clock_words=words,
+            speed_of_sound_m_per_s=sound,
+            u_scale=track.u_scale,
+            u_offset_m=track.u_offset_m,
+            sonic=sonic,
+            clock_refused=refused,
+        )
 
 
 def _rate(track: Track) -> tuple[Estimate, str, bool]:
@@ -120,4 +129,10 @@ def _uncompared(track: Track, limit: float, spec: str) -> tuple[Estimate, str, b
         return _uncorrected(half), words, True
     source = {"nominal": "are row numbers over the nominal rate", "host": "are the host's"}
     times = source.get(track.clock, "were measured by the device")
-    return Estimate(1.0, U_CRYSTAL), f"times {times}: {spec} stand in every frequency's uncertainty", False
+    if track.u_rate:
+        times, spec = (
+            "follow from arrivals",
+            f"a crystal's {U_CRYSTAL * 1e6:.0f} and their {track.u_rate * 1e6:.2g} ppm",
+        )
+    rate = Estimate(1.0, math.hypot(U_CRYSTAL, track.u_rate))
+    return rate, f"times {times}: {spec} stand in every frequency's uncertainty", False

@@ -11,8 +11,8 @@ import numpy as np
 from uncertainties import UFloat, nominal_value, ufloat, umath
 
 from pipeline.numerics.levels import LIMIT
-from pipeline.numerics.quantity import power_of, product_of
 from pipeline.track import F8
+from pipeline.units import power_of, product_of
 
 EXPONENT_ROUNDING = 1e-13
 """Share of a value; a smaller u is left by correlations that cancel, as in period times frequency."""

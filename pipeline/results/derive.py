@@ -22,17 +22,17 @@ from pipeline.damping.law_fit import LawFit, mean_squared_rate
 from pipeline.damping.laws import Drag, Law, free_power
 from pipeline.damping.laws.drag import COEFFICIENTS
 from pipeline.damping.select import Damping
-from pipeline.motion.averaged import Fitted, Phase
+from pipeline.motion.fitted import Fitted, Phase
 from pipeline.numerics.estimate import Estimate, Joint, UpperLimit
 from pipeline.numerics.levels import LIMIT
 from pipeline.numerics.robust import U_OF_MAD, mad_sigma
-from pipeline.registry.quantities import QUANTITIES
+from pipeline.quantities import QUANTITIES
 from pipeline.results.ambient import Ambient
 from pipeline.results.budget import Budget, Inputs, function_of, joint_of
 from pipeline.results.curves import Curve, drag_curve, energy_curve
 from pipeline.results.effects import Effect
 from pipeline.track import F8, UNUSABLE, Quality, Track
-from pipeline.windows.demodulate import Demodulated
+from pipeline.windows.demodulate import Windows
 
 U_AIR_TEMPERATURE_K = 0.5  # standard uncertainty of an air temperature stated without one, K
 
@@ -104,16 +104,16 @@ class Derived:
         """Factor from amplitudes of the record to those of the motion, before the filter of a sensor."""
         return Estimate.of_variable(self.scales[1], "").value
 
-    def energy_curve(self, damping: Damping, demodulated: Demodulated) -> Curve | None:
+    def energy_curve(self, damping: Damping, windows: Windows) -> Curve | None:
         """Return the mechanical energy against time with its band, in J, or in J/kg if no mass is known."""
         if self.half_stiffness is None:
             return None
         unit = "J/kg" if self.effective_mass_kg is None else "J"
-        return energy_curve(damping, demodulated, self.half_stiffness, self.laws, unit)
+        return energy_curve(damping, windows, self.half_stiffness, self.laws, unit)
 
-    def drag_curve(self, damping: Damping, demodulated: Demodulated) -> Curve | None:
+    def drag_curve(self, damping: Damping, windows: Windows) -> Curve | None:
         """Return the drag coefficient against amplitude with its band."""
-        return None if self.drag_length is None else drag_curve(damping, demodulated, self.drag_length, self.laws)
+        return None if self.drag_length is None else drag_curve(damping, windows, self.drag_length, self.laws)
 
 
 def derive(
@@ -141,7 +141,7 @@ def derive(
     :math:`x = \\sum_i w_i x_i` and :math:`u^2 = \\sum_i w_i (u_i^2 + (x_i - x)^2)`.
     """
     inputs = Inputs()
-    laws = _Laws(fitted.damping, inputs, fitted.demodulated)
+    laws = _Laws(fitted.damping, inputs, fitted.windows)
     unit = track.unit
     every, coefficients, scales = _results(track, fitted, scene, effects, misfits, laws, inputs)
     found = {name: (x, _unit_of(name, unit)) for name, x in every.items() if x is not None}
@@ -199,9 +199,9 @@ def _results(
     """Return the results by name, None where record or scene do not determine them, coefficients, and scales.
 
     The scales are the factors that convert rates and lengths of the record to true seconds and metres. A new estimate
-    is one entry here and one in :data:`pipeline.registry.quantities.QUANTITIES`.
+    is one entry here and one in :data:`pipeline.quantities.QUANTITIES`.
     """
-    demodulated, damping, phase, rest = fitted.demodulated, fitted.damping, fitted.phase, fitted.rest
+    windows, damping, phase, rest = fitted.windows, fitted.damping, fitted.phase, fitted.rest
     instrument, unit = Instrument.of(track), track.unit
     ambient = Ambient(scene, inputs, u_temperature_k=U_AIR_TEMPERATURE_K)
     amiss = _amiss(misfits, inputs)
@@ -212,16 +212,16 @@ def _results(
 
     rate = inputs.add("clock_rate", instrument.clock_rate, "B") * (1.0 + amiss["clock"])
     scale = ambient.scale(instrument) if unit == "m" else 1.0
-    windows = phase.residual.size
+    count = phase.residual.size
     # With one or two windows the uncertainty comes from the samples.
-    free = (windows - 2) / phase.correlation if windows > 2 else demodulated.residual.size - 3.0 * windows
+    free = (count - 2) / phase.correlation if count > 2 else windows.residual.size - 3.0 * count
     slope = inputs.add("angular_frequency", phase.angular_frequency, "A", free)
     omega = slope * rate
     gain, delay = _filtered(SensorFilter.of(scene, track.rate_hz), omega, inputs)
     lengths = scale * less_certain("amplitude", laws.values[0]) / gain
     rates = rate * less_certain("damping_rate", laws.values[1])
     start = laws.start * lengths * _crest(phase, laws, unit, inputs)
-    small = _small_swings(phase, laws, demodulated)
+    small = _small_swings(phase, laws, windows)
     slow = None if small is None else inputs.add("small_swings", small, "A", free) * rate
     lam = laws.rate_at_start * rates
     squared_rate = laws.squared_rate if phase.squared_rate is None else phase.squared_rate
@@ -230,7 +230,7 @@ def _results(
     displacement = {"m": 1.0, "m/s": natural**-0.5, "m/s^2": 1.0 / natural}.get(unit)
     zero = inputs.add("sensor_zero", Estimate(0.0, instrument.u_offset_m, unit), "B")
     offset = inputs.add("rest_position", rest.mean, "A", free) * scale
-    noise = inputs.add("noise", _noise(demodulated, unit), "A", demodulated.residual.size - 3.0 * windows)
+    noise = inputs.add("noise", _noise(windows, unit), "A", windows.residual.size - 3.0 * count)
     coefficients = _coefficients(laws, rates, lengths, lam, start)
     length: Any = scene.pendulum_length_m
     per_angle = {"rad": 1.0, "rad/s": natural**-0.5}.get(unit)
@@ -288,7 +288,7 @@ def _results(
     return results, coefficients, (rates, lengths)
 
 
-def _small_swings(phase: Phase, laws: _Laws, demodulated: Demodulated) -> Estimate | None:
+def _small_swings(phase: Phase, laws: _Laws, windows: Windows) -> Estimate | None:
     """Return the angular frequency of very small swings; the next term of the series is part of its uncertainty.
 
     If the frequency of a swing is a share s off, the next term is about :math:`s^2/4`, as for a pendulum. What it adds
@@ -297,7 +297,7 @@ def _small_swings(phase: Phase, laws: _Laws, demodulated: Demodulated) -> Estima
     small = phase.small_swings
     if small is None or phase.backbone is None:
         return None
-    squares = float(laws.values[0]) ** 2 * float(np.median(demodulated.amplitude**2))
+    squares = float(laws.values[0]) ** 2 * float(np.median(windows.amplitude**2))
     next_term = 0.25 * (phase.backbone.value / small.value) ** 2 * squares * small.value
     return Estimate(small.value, math.hypot(small.u, next_term), small.unit)
 
@@ -320,8 +320,8 @@ def _amiss(misfits: tuple[Misfit, ...], inputs: Inputs) -> Mapping[str, Any]:
     by_name: dict[str, Any] = defaultdict(float)
     for misfit in misfits:
         sizes = {
-            "amplitude": misfit.amplitude_m,
-            "offset": misfit.offset_m,
+            "amplitude": misfit.amplitude,
+            "offset": misfit.offset,
             "phase": misfit.phase_rad,
             "damping_rate": misfit.damping_rate,
             "clock": misfit.clock,
@@ -346,9 +346,9 @@ def _filtered(smoothing: SensorFilter | None, omega: Any, inputs: Inputs) -> tup
 class _Laws:
     """Inputs that depend on the damping law: start amplitude, damping rate, rms displacement and coefficients."""
 
-    def __init__(self, damping: Damping, inputs: Inputs, demodulated: Demodulated) -> None:
-        elapsed, best = demodulated.t - damping.t0, damping.best
-        every = average_over_laws(damping, math.sqrt(float(np.mean(demodulated.amplitude**2))))
+    def __init__(self, damping: Damping, inputs: Inputs, windows: Windows) -> None:
+        elapsed, best = windows.t - damping.t0, damping.best
+        every = average_over_laws(damping, math.sqrt(float(np.mean(windows.amplitude**2))))
         found = [(one, *_of_law(one.fit, elapsed)) for one in every]
         # A law that is infinite within the record cannot be averaged with the others.
         found = [(one, values, slopes) for one, values, slopes in found if np.isfinite(values @ slopes).all()]
@@ -451,14 +451,14 @@ def _masses(
     return own, None
 
 
-def _noise(demodulated: Demodulated, unit: str) -> Estimate:
+def _noise(windows: Windows, unit: str) -> Estimate:
     """Return the noise of one sample, from the median of the absolute residuals.
 
     For a distribution with heavy tails, the standard deviation is a matter of definition. So the uncertainty is no less
     than the difference to the root mean square of the samples used. It also includes the relative error of the median
     if a share e of the samples are outliers like those left out.
     """
-    flags, residual = demodulated.flags, demodulated.residual
+    flags, residual = windows.flags, windows.residual
     clean = not flags.any()
     if not clean:
         residual = residual[(flags & UNUSABLE) == 0]
@@ -466,8 +466,8 @@ def _noise(demodulated: Demodulated, unit: str) -> Estimate:
     if not finite.all():
         residual = residual[finite]
     used = residual.size
-    dof = float(max(used - 3 * demodulated.count.size, demodulated.count.size))
+    dof = float(max(used - 3 * windows.count.size, windows.count.size))
     value = mad_sigma(residual) * math.sqrt(used / dof)
     wide = 0.0 if clean else np.count_nonzero(flags & np.uint8(Quality.FALSE_ECHO)) / flags.size
-    u = max(U_OF_MAD * value / math.sqrt(dof), abs(demodulated.noise_m - value))
+    u = max(U_OF_MAD * value / math.sqrt(dof), abs(windows.noise - value))
     return Estimate(value, math.hypot(u, U_OF_MAD * wide * value), unit)

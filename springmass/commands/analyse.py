@@ -189,8 +189,8 @@ def _judged(run: Run, options: AnalyseOptions) -> int:
 def _print_text(run: Run, options: AnalyseOptions) -> None:
     """Print Table 1, one sentence on damping and the warnings, and further parts on request."""
     from springmass.report.words import damping_sentence
-    from springmass.result.advice import trust_text
     from springmass.result.budget_tables import budget_text
+    from springmass.result.grades import grades_text
     from springmass.terminal.printing import classic_text, findings_text, fitted, text_table, wrapped
     from springmass.terminal.style import style_of
     from springmass.typeset import typeset
@@ -201,7 +201,7 @@ def _print_text(run: Run, options: AnalyseOptions) -> None:
         print(f"{classic_text(run.classic)}\n")
     if options.full and (budget := budget_text(run.analysis)):
         print(f"{fitted(budget, style.width) if style.terminal else budget}\n")
-    for text in (trust_text(run.analysis, page=style.unicode), damping_sentence(run.analysis)):
+    for text in (grades_text(run.analysis, page=style.unicode), damping_sentence(run.analysis)):
         if text:
             print(f"{wrapped(text, '', 80)}\n")
     print(findings_text(run.result["findings"], typeset if style.unicode else str, full=options.full))

@@ -57,7 +57,7 @@ from springmass.terminal.style import style_of, watched
 from storage.errors import WriteFailed, one_line
 from storage.recorder import check_disk
 from storage.recovery.recover import recover
-from storage.recovery.report import RecoverReport
+from storage.recovery.report import RecoveredRun, RecoverReport
 from storage.run_file.reading import open_run
 
 U_RULER_M = 0.5e-3
@@ -202,7 +202,7 @@ def _built(ended: Ended, out: Path, session: Session) -> tuple[int, Path | None,
     except Exception as error:
         code = SENSOR if status.error or isinstance(error, WriteFailed) else UNREADABLE
         return code, None, [f"springmass: the run file was not built ({one_line(error)}); {_what_to_do(log)}"]
-    lines = list(report.describe())
+    lines = [line for run in report.runs for line in _how_read(run)] + list(report.describe())
     if not report.log_removed and log.exists():
         lines.append(f"{log}: the log stays")
     first = [run for run in report.runs if run.part == 1]
@@ -221,6 +221,29 @@ def _built(ended: Ended, out: Path, session: Session) -> tuple[int, Path | None,
         lines.append(f"stopped by {ended.by}; everything up to then is saved")
         code = INTERRUPTED
     return code, report.main.path, lines
+
+
+def _how_read(run: RecoveredRun) -> Iterator[str]:
+    """Yield how often lines without a clock of their own came, and what would give them better times."""
+    lines = run.decoding.get("clock", {}).get("lines")
+    if not lines or lines["u_rate_ppm"] is None or run.existed:
+        return
+    how = {
+        "even": "their times are whole steps of an even rate",
+        "echo": "their times are steps of a wait and the time of the echo",
+        "reads": "they come at no even rate, so their times are spread between the reads",
+    }[lines["steps"]]
+    u = f"known to {lines['u_rate_ppm']:.2g} ppm"
+    yield (
+        f"{run.sensor.port}: {lines['rate_hz']:.4g} lines per second without a time, read every "
+        f"{1e3 * lines['read_s']:.3g} ms, {lines['lost']} lost; {how} ({u})"
+    )
+    usb = Path(os.path.realpath(run.sensor.port)).name
+    if lines["read_s"] * lines["rate_hz"] > 1.2 and usb.startswith("ttyUSB"):
+        setting = f"/sys/bus/usb-serial/devices/{usb}/latency_timer"
+        yield f"{run.sensor.port}: the adapter collects lines; `echo 1 | sudo tee {setting}` makes it send at once"
+    elif lines["read_s"] * lines["rate_hz"] > 1.2 and usb.upper().startswith("COM"):
+        yield f"{run.sensor.port}: the adapter collects lines; set its latency timer to 1 ms in the Device Manager"
 
 
 def _usable(channel: int, report: RecoverReport, session: Session) -> bool:

@@ -5,14 +5,17 @@ from __future__ import annotations
 import shutil
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from acquisition.errors import FormatError, NeedsAnswer
+from acquisition.decoders.registry import get_family
+from acquisition.errors import FormatError, NeedsAnswer, SensorError
+from acquisition.live.line_times import settled
 from acquisition.recordings.identify import open_recording
 from acquisition.recordings.questions import Missing, MissingItem, Question
-from acquisition.recordings.recording import FormatIssue
+from acquisition.recordings.recording import FormatIssue, Recording
 from springmass.errors import LOG, UNREADABLE, ProgramError
 from springmass.layout import STDIN, part
 from springmass.loading.inputs import kind_of
@@ -126,7 +129,26 @@ def _load_run(path: Path, *, unverified: bool = False) -> Loaded:
                 raise
             remedy = f"{error.remedy}, or look at it as it is with --unverified (--read unverified=yes)"
             raise RunDamaged(path, error.problem, remedy) from error
-        return Loaded(recording, "run", run.header.scene, run.provenance, sha256, originals_inside=True)
+        recording, provenance = _with_line_times(recording, run.provenance)
+        return Loaded(recording, "run", run.header.scene, provenance, sha256, originals_inside=True)
+
+
+def _with_line_times(recording: Recording, provenance: Mapping[str, Any]) -> tuple[Recording, Mapping[str, Any]]:
+    """Return a run with better times if it is older than these, and its lines had only the times of their arrival."""
+    decoding = provenance.get("decoding", {})
+    clock = decoding.get("clock", {})
+    if recording.format != "wire" or recording.info.clock != "host" or "lines" in clock:
+        return recording, provenance
+    try:
+        polled = get_family(provenance.get("sensor", {}).get("family", "")).poll is not None
+    except SensorError:  # of a package that is not installed
+        return recording, provenance
+    if polled:
+        return recording, provenance
+    samples, lines = settled(recording.samples)
+    decoding = {**decoding, "clock": {**clock, "lines": lines.to_mapping()}}
+    recording = replace(recording, samples=samples, info=lines.described(recording.info))
+    return recording, {**provenance, "decoding": decoding}
 
 
 def _unverified(path: Path, differing: Sequence[RunDamaged]) -> tuple[FormatIssue, ...]:

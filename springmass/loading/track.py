@@ -46,6 +46,7 @@ def to_track(
         quantity=samples.quantity,
         unit=samples.unit,
         trigger_s=float(moments[0]) if moments else None,  # when the bob left its rest position
+        u_rate=info.u_rate or 0.0,
         **_clock_comparison(samples, info, facts),
         **_scale(recorded_format, facts.get("sensor") or {}),
     )

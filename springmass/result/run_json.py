@@ -11,13 +11,14 @@ from dataclasses import fields, is_dataclass
 from typing import Any
 
 from acquisition.recordings.recording import FormatIssue
-from pipeline.analysis import Motion, Oscillation
+from pipeline.analysis import Analysis, Oscillation
 from pipeline.findings.finding import UNKNOWN_CODE, Finding, by_severity, kinds, word
+from pipeline.notice import Notice
 from pipeline.numerics.estimate import Estimate, UpperLimit
-from pipeline.registry.found import Found
 from pipeline.results.budget import Contribution
 from springmass import __version__
 from springmass.loading.loaded import Loaded
+from springmass.result.grades import grades_json
 
 RESULT_SCHEMA = 3
 EXPANDED = ("dof", "coverage_factor", "expanded")  # of a budget, for its expanded uncertainty
@@ -32,6 +33,7 @@ NO_DETAILS: Mapping[str, Any] = {
         "coefficients": {},
         "laws": {},
     },
+    "grades": {},
 }
 
 
@@ -41,11 +43,17 @@ def rejected(findings: Sequence[Mapping[str, str]]) -> list[str]:
     return list(dict.fromkeys(grave))
 
 
-def details_of(motion: Motion) -> Mapping[str, Any]:
-    """Return budgets, correlations and damping, which are empty for a motion that does not oscillate."""
+def details_of(analysis: Analysis) -> Mapping[str, Any]:
+    """Return budgets, correlations, damping and grades, which are empty for a motion that does not oscillate."""
+    motion = analysis.motion
     if not isinstance(motion, Oscillation):
         return NO_DETAILS
-    return {"budget": _budgets(motion), "correlations": _correlations(motion), "damping": _damping(motion)}
+    return {
+        "budget": _budgets(motion),
+        "correlations": _correlations(motion),
+        "damping": _damping(motion),
+        "grades": grades_json(analysis),
+    }
 
 
 def provenance_of(accuracy: str, parameters: Mapping[str, Any], time_utc: str) -> dict[str, Any]:
@@ -88,9 +96,9 @@ def with_traps(findings: Sequence[Finding], traps: Sequence[FormatIssue]) -> tup
 
 def _of_reader(trap: FormatIssue) -> Finding:
     if trap.code in kinds():
-        return word(Found(trap.code, {"sentence": _sentence(trap.message)}))
+        return word(Notice(trap.code, {"sentence": _sentence(trap.message)}))
     # A run file may come from a version that knows more codes than this one.
-    return word(Found(UNKNOWN_CODE, {"sentence": f"{trap.code}: {trap.message}"}))
+    return word(Notice(UNKNOWN_CODE, {"sentence": f"{trap.code}: {trap.message}"}))
 
 
 def _sentence(clause: str) -> str:

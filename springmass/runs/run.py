@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from acquisition.recordings.recording import FormatIssue
-from pipeline.analyse import Analysis, Oscillation, Overdamped, analyse
+from pipeline.analyse import Analysis, Oscillation, Relaxation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError
 from pipeline.findings.finding import Finding
@@ -137,7 +137,7 @@ class Run(Mapping[str, Estimate]):
             "quality": {**analysis.quality, "malformed_rows": loaded.recording.malformed_rows},
             # The estimates of the lab report's own method replace those of the analysis.
             "estimates": analysis.estimates if classic is None else classic.estimates,
-            **(details_of(analysis.motion) if classic is None else NO_DETAILS),
+            **(details_of(analysis) if classic is None else NO_DETAILS),
             "effects": analysis.effects,
             "findings": analysis.findings,
             "provenance": provenance_of(how.method or how.accuracy, parameters, self.time_utc or now_utc()),
@@ -147,12 +147,12 @@ class Run(Mapping[str, Estimate]):
     @property
     def ok(self) -> bool:
         """Whether the run oscillates or relaxes, so that there is something to report."""
-        return isinstance(self.analysis.motion, Oscillation | Overdamped)
+        return isinstance(self.analysis.motion, Oscillation | Relaxation)
 
     @property
     def why(self) -> str:
         """Why the run is not ``ok``, as a sentence; empty if it is."""
-        return "" if isinstance(self.analysis.motion, Oscillation | Overdamped) else self.analysis.motion.why
+        return "" if isinstance(self.analysis.motion, Oscillation | Relaxation) else self.analysis.motion.why
 
     @property
     def law(self) -> str | None:

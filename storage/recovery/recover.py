@@ -226,7 +226,7 @@ def _readers(
     except AcquisitionError as error:
         raise NotALog(contents.path, f"header.sensors: {error}", FOREIGN) from error
     readers = {part: PartReader(part, by_channel[part.sensor], chain) for part, chain in chains.items()}
-    return readers, LogDecoder(by_channel, chains.get)
+    return readers, LogDecoder(by_channel, chains.get, whole=True)
 
 
 def open_log(path: str | os.PathLike[str]) -> tuple[LogContents, LogSurvey]:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
-from acquisition.block import Block
+from acquisition.block import Block, concatenate
 from acquisition.decoders.registry import get_family
 from acquisition.events import Dropped, Lost, Reopened, StoredEvent, TimedOut
 from acquisition.live.calibration import Calibration
@@ -59,7 +59,8 @@ class LogDecoder:
     If records are missing or a port was lost, no frame spans the gap, and the first sample after it is flagged.
     ``channels`` are those of the sensors. ``chain_for`` returns the chain of a part that begins, or None if the part is
     not decoded. ``noted`` is called with every record that is not data, and with its event. ``chains`` has the chain of
-    each part so far, and ``reads`` the number of its reads.
+    each part so far, and ``reads`` the number of its reads. With ``whole`` the records are those of a whole log. Then
+    samples without a clock of their own get their final times, and are yielded at the end.
     """
 
     def __init__(
@@ -67,10 +68,13 @@ class LogDecoder:
         channels: Iterable[int],
         chain_for: Callable[[Part], SensorChain | None],
         noted: Callable[[Record, StoredEvent | None], object] = lambda *_: None,
+        *,
+        whole: bool = False,
     ) -> None:
         self._chain_for, self._noted = chain_for, noted
         self._parts = Parts(channels)
         self._held: dict[Part, list[tuple[int, bytes]]] = {}
+        self._unsettled: dict[Part, list[Block]] | None = {} if whole else None
         self.chains: dict[Part, SensorChain] = {}
         self.reads: dict[Part, int] = {}
         for part in self._parts.now.values():
@@ -96,6 +100,8 @@ class LogDecoder:
                 size = 0
                 yield from self._samples()
         yield from self._samples()
+        for part, blocks in (self._unsettled or {}).items():
+            yield part, self.chains[part].settle(concatenate(blocks))
 
     def _note(self, record: Record) -> None:
         event = event_of(record.payload) if record.kind is RecordKind.EVENT else None
@@ -129,5 +135,10 @@ class LogDecoder:
     def _samples(self) -> Iterator[tuple[Part, Block]]:
         for part, chain in self.chains.items():
             self._hand_over(part)
-            if len(chain):
-                yield part, chain.block()
+            if not len(chain):
+                continue
+            block = chain.block()
+            if self._unsettled is not None and chain.awaits_end:
+                self._unsettled.setdefault(part, []).append(block)
+            else:
+                yield part, block
