@@ -85,9 +85,7 @@ def _split_by(lines: Sequence[str], mark: str) -> Header | None:
     """Find the first rows of numbers in lines with a separator; None if there are none."""
     filled = [at for at, each in enumerate(lines) if each.strip(mark + " " if mark else "\t ")]
     cells = [_cells(lines[at], mark) for at in filled]
-    kinds = [
-        ["number" if mark and THOUSANDS.fullmatch(cell.encode()) else _kind(cell) for cell in row] for row in cells
-    ]
+    kinds = [["number" if THOUSANDS.fullmatch(cell.encode()) else _kind(cell) for cell in row] for row in cells]
     for at, first in enumerate(kinds):
         if not _is_row(first) or cells[at][0] == "-" or any("=" in cell for cell in cells[at]):
             continue  # "- 0.5" is a list of YAML

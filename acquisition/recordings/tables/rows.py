@@ -64,7 +64,7 @@ def read_rows(
             if at in cells_of:
                 cells_of[at] += [b""] * (count - len(cells_of[at])) + list(cells)
             sizes[at] = count + len(rows)
-            for row in np.flatnonzero(pieces[at][-1][1] == UNREAD_CELL).tolist() if mark else ():
+            for row in np.flatnonzero(pieces[at][-1][1] == UNREAD_CELL).tolist():
                 if THOUSANDS.fullmatch(cells[row]):
                     shown = cells[row].decode("utf-8", "replace")
                     problem = f'expected plain numbers, got a thousands separator in "{shown}"'
