@@ -262,7 +262,8 @@ class _Even(NamedTuple):
 
 def _all_arrived(reads: Reads, at: F8) -> bool:
     """Return whether no line was lost: the earliest arrivals of all stretches then lie on one line over their count."""
-    late, parts = at - at[-1] / reads.last[-1] * reads.last, np.array_split(np.arange(at.size), STRETCHES)
+    stretches = max(3, min(STRETCHES, at.size // 8))
+    late, parts = at - at[-1] / reads.last[-1] * reads.last, np.array_split(np.arange(at.size), stretches)
     earliest = np.array([rows[np.argmin(late[rows])] for rows in parts])
     x = reads.last[earliest]
     for _ in range(3):  # the minima are those relative to the line

@@ -32,6 +32,13 @@ def converted(metavar: str, words: str, convert: Callable[[str], Any]) -> Parame
     return Parameter(metavar=metavar, help=words, converter=every, accepts_keys=False, n_tokens=1)
 
 
+def _decoder_option(text: str) -> tuple[str, Any]:
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise ValueError("must be NAME=VALUE")
+    return name, int(value) if value.isdecimal() else value
+
+
 def _formats(_: Any, tokens: Sequence[Token]) -> tuple[str, ...]:
     kinds = tuple(kind.strip().lower() for kind in tokens[0].value.split(","))
     if not set(kinds) <= {"svg", "pdf", "png"}:
@@ -54,6 +61,9 @@ FiguresOption = Annotated[
     ),
 ]
 Json = Annotated[bool, Parameter(name="--json", help="print JSON on standard output")]
+DecoderOptions = Annotated[
+    tuple[tuple[str, Any], ...], converted("NAME=VALUE", "option of the decoder; may be repeated", _decoder_option)
+]
 Overwrite = Annotated[bool, flag("replace an existing output")]
 Strict = Annotated[bool, flag("exit with code 5 if a finding is an error")]
 
