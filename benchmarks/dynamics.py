@@ -9,10 +9,10 @@ import numpy as np
 from scipy.signal import lfilter
 
 from benchmarks.ratios import alternate
-from pipeline.dynamics import Equation, Problem, get_integrator
-from pipeline.dynamics.halving import auto
-from pipeline.dynamics.methods import DOP853, SolveIvp
 from pipeline.dynamics.strang import flow
+from pipeline.simulation import Equation, Problem, get_integrator
+from pipeline.simulation.halving import auto
+from pipeline.simulation.methods import DOP853, SolveIvp
 
 MIXED = Problem(Equation.from_laws(8.66, gamma_per_s=0.0073, beta_per_m_s=0.235), 0.05)
 LINEAR = Problem(Equation(angular_frequency_per_s=8.66, gamma_per_s=0.0073), 0.05)

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.bench.spring import oscillating_mass_kg
 from pipeline.numerics.estimate import Estimate
-from pipeline.results.compare import SpringRun, compare_springs
+from pipeline.several.compare import SpringRun, compare_springs
 
 SPRING_KG = 0.02
 STIFFNESS = 15.0

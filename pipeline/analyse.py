@@ -1,7 +1,8 @@
 """The analysis: from a track to estimates and findings, one stage after the other.
 
-Read :func:`analyse` from top to bottom. Each stage is a function whose result is a noun. A sample is flagged in three
-places: by the conditioning, by the windows and by the last fit, which may take back only a window's false echo.
+Read :func:`analyse` from top to bottom. Each stage is a function whose result is a noun. A sample is flagged by the
+conditioning, by the choice of the part (as outside, or as clipped, which may take back a plateau of the conditioning),
+by the windows, and by the last fit, which may take back only a window's false echo.
 """
 
 from __future__ import annotations
@@ -19,24 +20,26 @@ from pipeline.findings.finding import worded
 from pipeline.findings.motion import damping_findings, fit_findings, motion_findings
 from pipeline.findings.samples import clock_findings, part_findings, sample_findings
 from pipeline.findings.scene import scene_findings
-from pipeline.motion.averaged import Fitted, check_coherence, fit_windows, typical_miss
+from pipeline.modes.mode import Modes
+from pipeline.modes.subtract import separate
+from pipeline.motion.averaged import check_coherence, fit_windows, typical_miss
 from pipeline.motion.by_samples import FEW_WINDOWS, fit_samples
 from pipeline.motion.equation import fit_equation
-from pipeline.motion.overdamped import LEAST_DAMPING, Overdamped, find_overdamped
+from pipeline.motion.fitted import Fitted
+from pipeline.motion.relaxation import LEAST_DAMPING, Relaxation, find_relaxation
 from pipeline.motion.two_modes import WEAKER, find_two_modes
 from pipeline.numerics.threads import one_thread
 from pipeline.options import Options
+from pipeline.parts.part import check_sinusoid, find_part, start_of
 from pipeline.results.derive import derive
 from pipeline.results.effects import tabulate
-from pipeline.samples.condition import Conditioned, condition
+from pipeline.samples.condition import Samples, condition
 from pipeline.track import Track
 from pipeline.windows.cycles import NoOscillation
-from pipeline.windows.demodulate import Demodulated
-from pipeline.windows.disturbances import Disturbances, separate
-from pipeline.windows.free_part import check_sinusoid, free_part, start_of
+from pipeline.windows.demodulate import Windows
 from pipeline.windows.rounding import rounded
 
-__all__ = ["Analysis", "Oscillation", "Overdamped", "Still", "analyse"]
+__all__ = ["Analysis", "Oscillation", "Relaxation", "Still", "analyse"]
 
 
 @one_thread
@@ -59,20 +62,20 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
     if track.unit == "m" and track.sigma_m is None and scene.sensor_sigma_m is not None:
         track = replace(track, sigma_m=scene.sensor_sigma_m.value)
     samples = condition(track)
-    part = free_part(samples)
+    part = find_part(samples)
     if isinstance(part, NoOscillation):
         return without_period(samples, part, scene, options)
     samples, track = part.samples, part.samples.track
     if (why := check_sinusoid(samples, part.windows)) is not None:
         return without_period(samples, why, scene, options)
-    windows, disturbances = separate(samples, part.cycles, part.windows, modes=options.modes)
-    windows = rounded(windows, samples.quantum_m)
+    windows, modes = separate(samples, part.cycles, part.windows, sought=options.modes)
+    windows = rounded(windows, samples.quantum)
     laws = fit_laws(windows, start_of(samples, windows.angular_frequency), options.laws, options.known_law, track.unit)
 
     # For strong damping, or friction that stops the bob, the equation of motion is fitted, not its cycle average.
     solved = fit_equation(samples, windows, laws, stopped=part.stopped)
-    fitted = solved if isinstance(solved, Fitted) else _averaged(windows, disturbances, laws, samples, options)
-    if _may_relax(fitted, laws) and isinstance(relaxed := find_overdamped(samples), Overdamped):
+    fitted = solved if isinstance(solved, Fitted) else _averaged(windows, modes, laws, samples, options)
+    if _may_relax(fitted, laws) and isinstance(relaxed := find_relaxation(samples), Relaxation):
         return overdamped(samples, relaxed, scene, options)
     missed = 0.0 if fitted.method == "equation" else typical_miss(fitted)
     incoherent = check_coherence(fitted, missed)
@@ -84,34 +87,41 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
     found, misfits = judge(samples, fitted, SensorFilter.of(scene, track.rate_hz), part.lost)
     effects = tabulate(track, fitted, scene)
     derived = derive(track, fitted, scene, effects, misfits)
-    windows, swing_m = fitted.demodulated, (derived.estimates["offset"].value, fitted.damping.best.joint.values[0])
+    windows, swing = fitted.windows, (derived.estimates["offset"].value, fitted.damping.best.joint.values[0])
     findings = worded(
         track.unit,
         # A missing or wrong mass changes the spring constant more than anything that the recording shows.
         scene_findings(scene, effects, constant="spring_constant" in derived.estimates),
-        part_findings(part.segments, float(track.t[0]), float(track.t[-1])),
+        part_findings(part.partition, float(track.t[0]), float(track.t[-1])),
         motion_findings(part.cycles, fitted),
         damping_findings(fitted.damping),
         found,
         sample_findings(
             samples,
             windows.flags,
-            windows.noise_m,
+            windows.noise,
             find_clusters(track, windows, fitted.phase),
-            swing_m,
+            swing,
             by_chance=echoes_by_chance(samples.flags, windows),
         ),
         fit_findings(fitted, solved if isinstance(solved, str) else ""),
         clock_findings(track),
     )
     motion = Oscillation.of(fitted, part.cycles, derived)
-    return Analysis(track, scene, options, samples, motion, effects, findings, derived.estimates)
+    return Analysis(
+        track=track,
+        scene=scene,
+        options=options,
+        samples=samples,
+        motion=motion,
+        effects=effects,
+        findings=findings,
+        estimates=derived.estimates,
+    )
 
 
-def _averaged(
-    windows: Demodulated, disturbances: Disturbances, laws: Damping, samples: Conditioned, options: Options
-) -> Fitted:
-    fitted = fit_windows(windows, disturbances, laws)
+def _averaged(windows: Windows, modes: Modes, laws: Damping, samples: Samples, options: Options) -> Fitted:
+    fitted = fit_windows(windows, modes, laws)
     by_samples = options.rows == "samples" or windows.t.size < FEW_WINDOWS
     return fit_samples(fitted, samples) if by_samples else fitted
 
@@ -119,4 +129,4 @@ def _averaged(
 def _may_relax(fitted: Fitted, laws: Damping) -> bool:
     """Return whether the damping is strong and, if the equation of motion was fitted, linear."""
     linear = fitted.method != "equation" or fitted.damping.best is fitted.damping.of_powers(1)
-    return linear and laws.best.rate_at_start() / fitted.demodulated.angular_frequency > LEAST_DAMPING
+    return linear and laws.best.rate_at_start() / fitted.windows.angular_frequency > LEAST_DAMPING

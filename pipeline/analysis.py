@@ -9,15 +9,15 @@ from pipeline.bench.scene import Scene
 from pipeline.checks.echoes import count_quality
 from pipeline.errors import AnalysisError
 from pipeline.findings.finding import Finding
-from pipeline.motion.averaged import Fitted
-from pipeline.motion.overdamped import Overdamped
+from pipeline.motion.fitted import Fitted
+from pipeline.motion.relaxation import Relaxation
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.threads import one_thread
 from pipeline.options import Options
 from pipeline.results.curves import Smoothed, kinematics
 from pipeline.results.derive import Derived
 from pipeline.results.effects import Effect
-from pipeline.samples.condition import Conditioned
+from pipeline.samples.condition import Samples
 from pipeline.track import U8, Track
 from pipeline.windows.cycles import Cycles
 
@@ -42,7 +42,7 @@ class Still:
     why: str  # the reason, one sentence
 
 
-Motion = Oscillation | Overdamped | Still
+Motion = Oscillation | Relaxation | Still
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,16 +56,16 @@ class Analysis:
     track: Track
     scene: Scene
     options: Options
-    conditioned: Conditioned
+    samples: Samples
     motion: Motion
     effects: tuple[Effect, ...]
     findings: tuple[Finding, ...]  # the most severe first
-    estimates: Mapping[str, Estimate]  # by names in :data:`pipeline.registry.quantities.QUANTITIES`
+    estimates: Mapping[str, Estimate]  # by names in :data:`pipeline.quantities.QUANTITIES`
 
     @property
     def flags(self) -> U8:
         """The final flags of all samples, (n,) uint8."""
-        return self.motion.demodulated.flags if isinstance(self.motion, Oscillation) else self.conditioned.flags
+        return self.motion.windows.flags if isinstance(self.motion, Oscillation) else self.samples.flags
 
     @property
     def quality(self) -> dict[str, int]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from pipeline.bench.law_names import ANY_LAW
 from pipeline.damping.laws import LAWS, Law
 from pipeline.damping.select import FEW_LAWS
 from pipeline.errors import AnalysisError
-from pipeline.registry.laws import ANY_LAW
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

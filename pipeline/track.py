@@ -12,6 +12,8 @@ from pipeline.errors import TrackError
 
 F8 = NDArray[np.float64]
 U8 = NDArray[np.uint8]
+C16 = NDArray[np.complex128]
+Bools = NDArray[np.bool_]
 
 UNITS = {
     "length": "m",

@@ -26,11 +26,11 @@ from acquisition.recordings.tables.headings import Heading
 from acquisition.recordings.tables.table import Column, Header, Table
 from pipeline.damping.laws.law import Law
 from pipeline.damping.laws.of_function import make_law
-from pipeline.dynamics import Equation, Integrator, Problem, Trajectory, get_integrator
-from pipeline.dynamics.halving import auto
-from pipeline.dynamics.methods import OneStep, acceleration
 from pipeline.errors import AnalysisError, DynamicsError
-from pipeline.numerics.quantity import Unit
+from pipeline.simulation import Equation, Integrator, Problem, Trajectory, get_integrator
+from pipeline.simulation.halving import auto
+from pipeline.simulation.methods import OneStep, acceleration
+from pipeline.units import Unit
 
 # fmt: off
 __all__ = [

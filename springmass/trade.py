@@ -18,11 +18,11 @@ import numpy as np
 from pipeline.analyse import Analysis, analyse
 from pipeline.analysis import Oscillation
 from pipeline.damping.laws import Law, find_law
-from pipeline.dynamics import Equation, Problem, integrators
-from pipeline.dynamics.halving import auto
-from pipeline.dynamics.methods import SolveIvp
 from pipeline.errors import DynamicsError, PipelineError
 from pipeline.options import TIERS, options_for
+from pipeline.simulation import Equation, Problem, integrators
+from pipeline.simulation.halving import auto
+from pipeline.simulation.methods import SolveIvp
 from pipeline.track import F8, Track
 from springmass.simulations.simulation import reference
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import rooms
 
-from pipeline.dynamics import Equation, Integrator, Problem, get_integrator
 from pipeline.errors import DynamicsError
+from pipeline.simulation import Equation, Integrator, Problem, get_integrator
 from springmass import analyse, sample_data
 from springmass.charts.draw import legend, render, style, written
 from springmass.charts.run import amplitude

@@ -62,7 +62,16 @@ class Instrument:
                 raise TrackError(f"{name} must be finite and not negative, got {limit:g}", "leave it out")
         rate, words, refused = _rate(track)
         sound, sonic = track.speed_of_sound_m_per_s, track.sonic or track.speed_of_sound_m_per_s is not None
-        return cls(track.clock, rate, words, sound, track.u_scale, track.u_offset_m, sonic, refused)
+        return cls(
+            clock=track.clock,
+            clock_rate=rate,
+            clock_words=words,
+            speed_of_sound_m_per_s=sound,
+            u_scale=track.u_scale,
+            u_offset_m=track.u_offset_m,
+            sonic=sonic,
+            clock_refused=refused,
+        )
 
 
 def _rate(track: Track) -> tuple[Estimate, str, bool]:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from pipeline.bench.air import saturation_pressure
+from pipeline.bench.law_names import law_names
 from pipeline.errors import SceneError
 from pipeline.numerics.estimate import Estimate
-from pipeline.registry.laws import law_names
 
 Stated: TypeAlias = Estimate | float | tuple[float, float] | None
 """What a scene takes for a quantity: a number, or a pair (value, u), besides an estimate."""

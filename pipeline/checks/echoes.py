@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.motion.averaged import Phase
+from pipeline.motion.fitted import Phase
 from pipeline.numerics.levels import FALSE_ALARM, normal_quantile
 from pipeline.track import U8, UNUSABLE, Quality, Track
-from pipeline.windows.demodulate import CLIP_SIGMAS, Demodulated
+from pipeline.windows.demodulate import CLIP_SIGMAS, Windows
 
 # Minimum number of false echoes in a cluster, and maximum distance between neighbours. Independent echoes on one sample
 # in a thousand form a cluster at a given one with a probability of 1e-5.
@@ -31,7 +31,7 @@ def count_quality(flags: U8) -> dict[str, int]:
     return {**found, "used": sum(count for value, count in held if not value & int(UNUSABLE))}
 
 
-def echoes_by_chance(before: U8, demodulated: Demodulated) -> bool:
+def echoes_by_chance(before: U8, windows: Windows) -> bool:
     """Return whether normal noise explains both the number and the size of the false echoes.
 
     The number of n samples of normal noise beyond c standard deviations has a Poisson distribution with the mean
@@ -43,17 +43,17 @@ def echoes_by_chance(before: U8, demodulated: Demodulated) -> bool:
     echo = np.uint8(Quality.FALSE_ECHO)
     if np.any(before & echo):
         return False
-    rows = np.flatnonzero(demodulated.flags & echo)
-    n = int(np.count_nonzero((demodulated.flags & UNUSABLE) == 0)) + rows.size
-    farthest = float(np.max(np.abs(demodulated.residual[rows]), initial=0.0))
+    rows = np.flatnonzero(windows.flags & echo)
+    n = int(np.count_nonzero((windows.flags & UNUSABLE) == 0)) + rows.size
+    farthest = float(np.max(np.abs(windows.residual[rows]), initial=0.0))
     expected = 2.0 * n * 2.0 * float(ndtr(-CLIP_SIGMAS))
     return bool(
-        farthest < normal_quantile(1.0 - FALSE_ALARM / n) * demodulated.noise_m
+        farthest < normal_quantile(1.0 - FALSE_ALARM / n) * windows.noise
         and pdtrc(rows.size - 1, expected) > FALSE_ALARM
     )
 
 
-def find_clusters(track: Track, demodulated: Demodulated, phase: Phase) -> dict[str, float]:
+def find_clusters(track: Track, windows: Windows, phase: Phase) -> dict[str, float]:
     """Return the number of clusters of false echoes, of echoes in them, and of clusters nearer to a turning point.
 
     By chance half of them are. ``shift_m`` is the increase of the mean amplitude if all false echoes were used. Without
@@ -63,7 +63,7 @@ def find_clusters(track: Track, demodulated: Demodulated, phase: Phase) -> dict[
     :math:`2\\sum r_i\\cos\\varphi_i/N`. The sum is over the false echoes; N is the number of samples fitted, including
     them.
     """
-    rows = np.flatnonzero((demodulated.flags & np.uint8(Quality.FALSE_ECHO)) != 0)
+    rows = np.flatnonzero((windows.flags & np.uint8(Quality.FALSE_ECHO)) != 0)
     starts = np.append(0, np.flatnonzero(np.diff(rows) > CLUSTER) + 1)
     sizes = np.diff(np.append(starts, rows.size))
     clusters = sizes >= CLUSTER
@@ -71,8 +71,8 @@ def find_clusters(track: Track, demodulated: Demodulated, phase: Phase) -> dict[
         return {}
     angle = phase.total(track.t[rows])
     middles = angle[(starts + sizes // 2)[clusters]]
-    fitted = int(np.count_nonzero((demodulated.flags & UNUSABLE) == 0)) + rows.size
-    residual = demodulated.residual[rows]
+    fitted = int(np.count_nonzero((windows.flags & UNUSABLE) == 0)) + rows.size
+    residual = windows.residual[rows]
     residual[~np.isfinite(residual)] = 0.0
     return {
         "clusters": int(np.count_nonzero(clusters)),

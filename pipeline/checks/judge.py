@@ -15,10 +15,10 @@ from pipeline.checks.residual import Misfit, Outcome, Residual, residual_of
 from pipeline.checks.rounding import rounding
 from pipeline.checks.sensor import held, smoothed
 from pipeline.checks.shape import folded_shape
-from pipeline.motion.averaged import Fitted
-from pipeline.registry.found import Found
-from pipeline.samples.condition import Conditioned
-from pipeline.windows.lost_rows import LostRows
+from pipeline.motion.fitted import Fitted
+from pipeline.notice import Notice
+from pipeline.parts.lost_rows import LostRows
+from pipeline.samples.condition import Samples
 
 # The tests of the residual in order.
 TESTS: tuple[Callable[[Residual], Outcome | None], ...] = (
@@ -33,8 +33,8 @@ TESTS: tuple[Callable[[Residual], Outcome | None], ...] = (
 
 
 def judge(
-    samples: Conditioned, fitted: Fitted, filter_: SensorFilter | None, lost: LostRows | None = None
-) -> tuple[tuple[Found, ...], tuple[Misfit, ...]]:
+    samples: Samples, fitted: Fitted, filter_: SensorFilter | None, lost: LostRows | None = None
+) -> tuple[tuple[Notice, ...], tuple[Misfit, ...]]:
     """Return what the limits and the tests found, and what it adds to the uncertainties.
 
     A solution of the equation of motion is held against the limits only: strong damping distorts every period, which
@@ -56,6 +56,6 @@ def judge(
             numbers.setdefault(one.code, {}).update(one.numbers)
     if "model_misfit" in numbers:
         numbers["model_misfit"]["scatter_excess_m"] = fitted.damping.scatter.excess or None
-    found = tuple(Found(code, each) for code, each in numbers.items())
+    found = tuple(Notice(code, each) for code, each in numbers.items())
     misfits = (*(one.misfit for one in outcomes), rounding(samples, fitted))
     return found, tuple(misfit for misfit in misfits if misfit is not None)

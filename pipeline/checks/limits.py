@@ -10,10 +10,10 @@ import numpy as np
 
 from pipeline.bench.spring import GRAVITY_M_PER_S2
 from pipeline.checks.residual import Misfit, Outcome
-from pipeline.motion.averaged import Fitted
+from pipeline.motion.fitted import Fitted
 from pipeline.numerics.levels import NEGLIGIBLE
 from pipeline.numerics.robust import median
-from pipeline.samples.condition import Conditioned
+from pipeline.samples.condition import Samples
 from pipeline.track import UNUSABLE
 
 
@@ -29,11 +29,11 @@ class Limit(NamedTuple):
 
 
 def _too_fast(numbers: Mapping[str, float]) -> Misfit:
-    return Misfit(name="implausible_motion", amplitude_m=numbers["amplitude_m"] * (1.0 - 1.0 / numbers["gravities"]))
+    return Misfit(name="implausible_motion", amplitude=numbers["amplitude_m"] * (1.0 - 1.0 / numbers["gravities"]))
 
 
 def _no_distance(numbers: Mapping[str, float]) -> Misfit:
-    return Misfit(name="implausible_distance", offset_m=max(numbers["amplitude_m"], numbers["rest_m"]))
+    return Misfit(name="implausible_distance", offset=max(numbers["amplitude_m"], numbers["rest_m"]))
 
 
 LIMITS = (
@@ -50,7 +50,7 @@ LIMITS = (
 )
 
 
-def beyond_limits(samples: Conditioned, fitted: Fitted) -> Iterator[Outcome]:
+def beyond_limits(samples: Samples, fitted: Fitted) -> Iterator[Outcome]:
     """Yield every limit that the motion exceeds.
 
     The spring can only pull, so the bob never accelerates downward faster than in free fall: :math:`A\\omega^2 \\le g`,
@@ -69,29 +69,29 @@ def beyond_limits(samples: Conditioned, fitted: Fitted) -> Iterator[Outcome]:
         yield Outcome(limit.code, {name: numbers[name] for name in limit.shown}, misfit)
 
 
-def _numbers(samples: Conditioned, fitted: Fitted) -> dict[str, float]:
+def _numbers(samples: Samples, fitted: Fitted) -> dict[str, float]:
     """Return the numbers by name, NaN where they have no meaning for the record's quantity."""
-    track, windows = samples.track, fitted.demodulated
+    track, windows = samples.track, fitted.windows
     used = (windows.flags & UNUSABLE) == 0
     t, y = track.t[used], track.y[used]
-    omega, amplitude_m = fitted.phase.angular_frequency.value, float(np.max(np.abs(windows.amplitude)))
-    f, rest_m = omega / (2.0 * math.pi), abs(float(np.mean(windows.offset)))
+    omega, amplitude = fitted.phase.angular_frequency.value, float(np.max(np.abs(windows.amplitude)))
+    f, rest = omega / (2.0 * math.pi), abs(float(np.mean(windows.offset)))
     per_value = {"m": omega**2, "m/s": omega, "m/s^2": 1.0}.get(track.unit, math.nan)
     numbers = {
         "samples_per_period": 1.0 / (median(np.diff(t)) * f) if t.size > 1 else math.nan,
         "frequency_hz": f,
         "period_s": 1.0 / f,
-        "amplitude_m": amplitude_m,
-        "rest_m": rest_m,
-        "gravities": amplitude_m * per_value / GRAVITY_M_PER_S2,
+        "amplitude_m": amplitude,
+        "rest_m": rest,
+        "gravities": amplitude * per_value / GRAVITY_M_PER_S2,
         "sag_metres": GRAVITY_M_PER_S2 / omega**2 if math.isfinite(per_value) else math.nan,
         **dict.fromkeys(("low_m", "high_m", "farthest_m", "nearest_m", "share_of_distance"), math.nan),
     }
     # If distances start from zero at the first sample, as after integration of a velocity, their zero has no meaning.
     if track.unit == "m" and y.size and track.y[0] != 0.0:
-        low_m, high_m = float(np.min(y)), float(np.max(y))
-        numbers |= {"low_m": low_m, "high_m": high_m, "farthest_m": max(high_m, -low_m)}
+        low, high = float(np.min(y)), float(np.max(y))
+        numbers |= {"low_m": low, "high_m": high, "farthest_m": max(high, -low)}
         # Positions counted from rest have both signs; no sensor of distances gives many negative ones.
         if float(np.mean(y < 0.0)) < NEGLIGIBLE:
-            numbers |= {"nearest_m": low_m, "share_of_distance": amplitude_m / rest_m if rest_m else math.inf}
+            numbers |= {"nearest_m": low, "share_of_distance": amplitude / rest if rest else math.inf}
     return numbers

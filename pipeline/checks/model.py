@@ -17,9 +17,9 @@ ALARM_OF_A_TEST = FALSE_ALARM / 3.0  # probability of a false alarm of each of t
 
 def excess(residual: Residual) -> Outcome | None:
     """Test whether the part that the whole model does not describe is larger than the noise within a period."""
-    rms_m, noise_m = residual.fitted.waveform.rms_m, residual.noise_m
-    if rms_m > MISFIT * max(noise_m, residual.rounding_m):
-        return Outcome("model_misfit", {"rms_m": rms_m, "noise_m": noise_m})
+    rms, noise = residual.fitted.waveform.rms, residual.noise
+    if rms > MISFIT * max(noise, residual.rounding):
+        return Outcome("model_misfit", {"rms_m": rms, "noise_m": noise})
     return None
 
 
@@ -41,7 +41,7 @@ def halves(residual: Residual) -> Outcome | None:
     largest is tested.
     """
     fitted = residual.fitted
-    windows, damping = fitted.demodulated, fitted.damping
+    windows, damping = fitted.windows, fitted.damping
     if windows.t.size < 2 * FEWEST_FOR_CURVE:
         return None
     amplitudes = (windows.amplitude - damping.best.amplitude(windows.t - damping.t0)) / damping.scatter.u
@@ -85,7 +85,7 @@ def colour(residual: Residual) -> Outcome | None:
     white = normal_quantile(1.0 - ALARM_OF_A_TEST / lags) / math.sqrt(pairs[lag] or 1.0)
     # With fewer pairs than samples the estimate may exceed 1, which a correlation cannot.
     strongest = max(-1.0, min(float(correlation[lag]), 1.0))
-    predictable_m = math.sqrt(abs(strongest) * sums[0] / pairs[0])
-    if abs(strongest) <= max(0.5, white) or predictable_m < NOTICEABLE * residual.amplitude_m:
+    predictable = math.sqrt(abs(strongest) * sums[0] / pairs[0])
+    if abs(strongest) <= max(0.5, white) or predictable < NOTICEABLE * residual.amplitude:
         return None
     return Outcome("model_misfit", {"correlation": strongest, "lag_s": lag * residual.step_s})

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.bench.sensor_filter import SensorFilter
-from pipeline.motion.averaged import Fitted
+from pipeline.motion.fitted import Fitted
 from pipeline.numerics.levels import FEWEST_FOR_LINE
 from pipeline.numerics.robust import median
-from pipeline.samples.condition import Conditioned
+from pipeline.samples.condition import Samples
 from pipeline.track import F8, UNUSABLE
 from pipeline.windows.demodulate import model_error
 
@@ -29,8 +29,8 @@ class Misfit:
     """Standard uncertainties of the estimates because the model of the fit does not describe the record."""
 
     name: str  # of the input in every budget
-    amplitude_m: float = 0.0
-    offset_m: float = 0.0
+    amplitude: float = 0.0
+    offset: float = 0.0
     phase_rad: float = 0.0
     damping_rate: float = 0.0
     clock: float = 0.0  # relative, of all quantities measured by the times of the record
@@ -55,16 +55,16 @@ class Outcome:
 class Residual:
     """The residual at the samples used (k,), and the fit that left it."""
 
-    samples: Conditioned
+    samples: Samples
     fitted: Fitted
     filter: SensorFilter | None  # of the sensor, as the scene states it
     values: F8  # still with the harmonics that were subtracted as modes
     phase: F8  # of the oscillation, rad
     relative: F8 | None  # amplitude over that at the first sample; None if it cannot be calculated
     rows: NDArray[np.int64]  # indices of the samples
-    noise_m: float  # standard deviation of one sample
-    rounding_m: float  # error of the sinusoid of a window, which is larger than the noise of computed records
-    amplitude_m: float  # mean amplitude
+    noise: float  # standard deviation of one sample
+    rounding: float  # error of the sinusoid of a window, which is larger than the noise of computed records
+    amplitude: float  # mean amplitude
     seconds: float
     step_s: float  # mean time between samples
     turn: float  # increase of the phase from sample to sample, rad
@@ -79,7 +79,7 @@ class Residual:
     @property
     def noisy(self) -> bool:
         """Whether there is noise, and not only rounding or coarse steps, which the finding "quantised" reports."""
-        return self.noise_m > max(self.rounding_m, (self.samples.quantum_m or 0.0) / COARSE)
+        return self.noise > max(self.rounding, (self.samples.quantum or 0.0) / COARSE)
 
     def on_grid(self) -> tuple[F8, F8]:
         """Return the residual of all samples (n,), 0 where none was used, and 1 where one was used."""
@@ -92,31 +92,31 @@ class Residual:
         return replace(self, values=self.values - outcome.explains, lags=max(self.lags, outcome.lags))
 
 
-def residual_of(samples: Conditioned, fitted: Fitted, filter_: SensorFilter | None) -> Residual:
+def residual_of(samples: Samples, fitted: Fitted, filter_: SensorFilter | None) -> Residual:
     """Return the residual of a run that was fitted by its windows."""
-    windows, disturbances, t = fitted.demodulated, fitted.disturbances, samples.track.t
+    windows, modes, t = fitted.windows, fitted.modes, samples.track.t
     rows = np.flatnonzero(((windows.flags & UNUSABLE) == 0) & np.isfinite(windows.residual))
     values = windows.residual[rows]
-    locked = tuple(mode for mode in disturbances.sideways.modes if mode.kind == "harmonic")
-    if disturbances.modelled and locked:
-        values = values + replace(disturbances.sideways, modes=locked).position(t[rows])
+    locked = tuple(mode for mode in modes.members if mode.kind == "harmonic")
+    if modes.subtracted is not None and locked:
+        values = values + replace(modes, members=locked).position(t[rows])
     size = np.abs(fitted.damping.best.amplitude(np.maximum(t[rows] - fitted.damping.t0, 0.0)))
     falls = bool(size.size and np.isfinite(size).all() and size[0] > 0.0)
     seconds = float(t[rows[-1]] - t[rows[0]]) if rows.size else 0.0
     step_s = seconds / max(int(rows[-1] - rows[0]), 1) if rows.size else 0.0
     return Residual(
-        samples,
-        fitted,
-        filter_,
-        values,
-        fitted.phase.total(t[rows]),
-        size / size[0] if falls else None,
-        rows,
-        windows.noise_m,
-        median(model_error(windows.amplitude, windows.decay, windows.angular_frequency)),
-        float(np.mean(np.abs(windows.amplitude))),
-        seconds,
-        step_s,
-        fitted.phase.angular_frequency.value * step_s,
-        rows.size // windows.t.size,
+        samples=samples,
+        fitted=fitted,
+        filter=filter_,
+        values=values,
+        phase=fitted.phase.total(t[rows]),
+        relative=size / size[0] if falls else None,
+        rows=rows,
+        noise=windows.noise,
+        rounding=median(model_error(windows.amplitude, windows.decay, windows.angular_frequency)),
+        amplitude=float(np.mean(np.abs(windows.amplitude))),
+        seconds=seconds,
+        step_s=step_s,
+        turn=fitted.phase.angular_frequency.value * step_s,
+        per_window=rows.size // windows.t.size,
     )

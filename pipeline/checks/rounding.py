@@ -7,34 +7,34 @@ import math
 import numpy as np
 
 from pipeline.checks.residual import Misfit
-from pipeline.motion.averaged import Fitted
+from pipeline.motion.fitted import Fitted
 from pipeline.numerics.levels import NEGLIGIBLE
-from pipeline.samples.condition import Conditioned
+from pipeline.samples.condition import Samples
 from pipeline.windows.rounding import rounding_errors
 
 
-def rounding(samples: Conditioned, fitted: Fitted) -> Misfit | None:
+def rounding(samples: Samples, fitted: Fitted) -> Misfit | None:
     """Return what rounding adds to the uncertainties; None if it is negligible.
 
     The rest position lies at the same place between two steps in all windows, so the errors of their amplitudes are one
     function of the amplitude, and a least-squares fit of the law makes of them errors of its parameters. A law with one
     coefficient follows them less than one with two, which may be the true one; the larger errors count.
     """
-    damping, windows = fitted.damping, fitted.demodulated
+    damping, windows = fitted.damping, fitted.windows
     elapsed, best = windows.t - damping.t0, damping.best
-    errors = rounding_errors(best.amplitude(elapsed), samples.quantum_m, windows.noise_m)
+    errors = rounding_errors(best.amplitude(elapsed), samples.quantum, windows.noise)
     if float(np.max(np.abs(errors))) <= NEGLIGIBLE * best.joint["A0"].u:
         return None
-    u_amplitude_m, u_rate = 0.0, 0.0
+    u_amplitude, u_rate = 0.0, 0.0
     for fit in (best, damping.of_powers(1, 2) or best):
         _, by = fit.law.curve(elapsed, fit.joint.values)
         if not np.isfinite(by).all():  # the law is infinite within the record, and no result is an average over it
             continue
         moved = np.linalg.lstsq(by, errors, rcond=None)[0]  # half of the errors of the amplitude
-        u_amplitude_m = max(u_amplitude_m, float(abs(moved[0])))
+        u_amplitude = max(u_amplitude, float(abs(moved[0])))
         u_rate = max(u_rate, float(abs(fit.slopes_of_rate() @ moved)))
-    if u_amplitude_m <= NEGLIGIBLE * best.joint["A0"].u and u_rate <= NEGLIGIBLE * best.damping_rate().u:
+    if u_amplitude <= NEGLIGIBLE * best.joint["A0"].u and u_rate <= NEGLIGIBLE * best.damping_rate().u:
         return None
     # The windows' uncertainties include it too: only what exceeds that of their mean is added.
-    u_rest_m = math.sqrt(max(0.25 * float(abs(errors.mean())) ** 2 - fitted.rest.mean.u**2, 0.0))
-    return Misfit(name="rounding", amplitude_m=u_amplitude_m, offset_m=u_rest_m, damping_rate=u_rate)
+    u_rest = math.sqrt(max(0.25 * float(abs(errors.mean())) ** 2 - fitted.rest.mean.u**2, 0.0))
+    return Misfit(name="rounding", amplitude=u_amplitude, offset=u_rest, damping_rate=u_rate)

@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.checks.residual import Misfit, Outcome, Residual
 from pipeline.numerics.regression import correlation_length
-from pipeline.samples.condition import Conditioned
+from pipeline.samples.condition import Samples
 from pipeline.track import F8
 
 # Correlation of neighbouring residuals that shows a filter. A running mean over two samples gives 0.5; white noise of
@@ -26,7 +26,7 @@ CUSP = 0.5
 LINES = 1.8
 
 
-def held_count(samples: Conditioned) -> int:
+def held_count(samples: Samples) -> int:
     """Return the number of samples over which each reading is held; 1 if every sample is new.
 
     Readings in coarse steps are repeated too, but they change at any row. Held ones change only at every k-th row.
@@ -62,18 +62,18 @@ def held(residual: Residual) -> Outcome | None:
     count = float(repeats)
     if repeats == 1:
         y = samples.track.y[samples.used]
-        rounding = max(2.02 * (samples.quantum_m or 0.0), 1e-12 * float(np.ptp(y)))
+        rounding = max(2.02 * (samples.quantum or 0.0), 1e-12 * float(np.ptp(y)))
         # White noise of deviation s bends the line by sqrt(6) s, and by more than x at a share erfc(x/(sqrt(12) s)).
-        bend_m = math.sqrt(6.0) * max(residual.noise_m, 1e-300)
-        white = math.erfc(rounding / (math.sqrt(2.0) * bend_m))
+        bend = math.sqrt(6.0) * max(residual.noise, 1e-300)
+        white = math.erfc(rounding / (math.sqrt(2.0) * bend))
         share = max(float(np.mean(np.abs(np.diff(y, 2)) > rounding)), 1e-3)
-        if rounding > bend_m or share > white / LINES:
+        if rounding > bend or share > white / LINES:
             return None
         # A reading between two samples bends the line at both.
         count, late = 2.0 * white / share, 0.0
     loss = min((2.0 - late) * (count * turn) ** 2 / 24.0, 1.0)
-    amplitude_m, phase_rad = residual.amplitude_m * loss, late * 0.5 * (count - 1.0) * turn
-    misfit = Misfit(name="held_samples", amplitude_m=amplitude_m, phase_rad=phase_rad)
+    amplitude, phase_rad = residual.amplitude * loss, late * 0.5 * (count - 1.0) * turn
+    misfit = Misfit(name="held_samples", amplitude=amplitude, phase_rad=phase_rad)
     return Outcome("held_samples", held_numbers(repeats, residual.step_s), misfit, lags=math.inf)
 
 
@@ -106,11 +106,11 @@ def smoothed(residual: Residual) -> Outcome | None:
     count /= max(1.0 - 3.0 * count / residual.per_window, 0.25)
     loss = min((count * turn) ** 2 / 8.0, 1.0)
     expected = 0.0 if stated is None else 1.0 - stated.gain(turn / residual.step_s)
-    u_amplitude_m = residual.fitted.damping.best.joint["A0"].u
-    if loss * residual.amplitude_m < 0.5 * u_amplitude_m or loss < 4.0 * expected:
+    u_amplitude = residual.fitted.damping.best.joint["A0"].u
+    if loss * residual.amplitude < 0.5 * u_amplitude or loss < 4.0 * expected:
         return None
     late = 0.5 * (count - 1.0)
-    misfit = Misfit(name="sensor_smoothing", amplitude_m=residual.amplitude_m * loss, phase_rad=late * turn)
+    misfit = Misfit(name="sensor_smoothing", amplitude=residual.amplitude * loss, phase_rad=late * turn)
     numbers = {
         "correlation": first / variance,
         "amplitude_loss": loss,

@@ -54,31 +54,31 @@ def folded_shape(residual: Residual) -> Outcome | None:
     stands = np.flatnonzero(chance < IMPROBABLE)
     each = np.real(mean[stands, None] * np.exp(1j * orders[stands, None] * CENTRES))
     wave = each.sum(axis=0)
-    peak_m = float(np.max(np.abs(wave)))
-    if not peak_m > max(0.5 * (residual.samples.quantum_m or 0.0), residual.rounding_m):
+    peak = float(np.max(np.abs(wave)))
+    if not peak > max(0.5 * (residual.samples.quantum or 0.0), residual.rounding):
         return None
-    amplitude_m, fall = residual.amplitude_m, 1.0
+    amplitude, fall = residual.amplitude, 1.0
     if falls and relative is not None:
-        amplitude_m /= float(np.mean(relative))
+        amplitude /= float(np.mean(relative))
         fall = max(1.0, -math.log(max(float(relative[-1]), 1e-3)))
     power, order = np.abs(mean[stands]) ** 2, orders[stands]
-    moved_m = peak_m + 2.0 * float(np.sum(np.sqrt(power[order == 3])))
+    moved = peak + 2.0 * float(np.sum(np.sqrt(power[order == 3])))
     misfit = Misfit(
         name="model_misfit",
-        amplitude_m=moved_m,
-        offset_m=peak_m,
-        phase_rad=peak_m / amplitude_m,
-        damping_rate=2.0 * moved_m / amplitude_m * fall / residual.seconds,
+        amplitude=moved,
+        offset=peak,
+        phase_rad=peak / amplitude,
+        damping_rate=2.0 * moved / amplitude * fall / residual.seconds,
     )
-    share, total = peak_m / amplitude_m, float(power.sum())
+    share, total = peak / amplitude, float(power.sum())
     even, second = float(power[order % 2 == 0].sum()) / total, float(power[order == 2].sum()) / total
     if even > 0.9 and second > 0.95:
         way = {"even": even}
     elif even < 0.1:
         way = {"odd": 1.0 - even}
     else:
-        way = {"near_peak_m" if abs(wave[BINS // 2]) > abs(wave[0]) else "far_peak_m": peak_m}
-    numbers = None if share < REPORTED else {"peak_m": peak_m, "share": share, **way}
+        way = {"near_peak_m" if abs(wave[BINS // 2]) > abs(wave[0]) else "far_peak_m": peak}
+    numbers = None if share < REPORTED else {"peak_m": peak, "share": share, **way}
     explained = np.zeros(bins.size)
     for one, k in zip(each, order.tolist(), strict=True):
         explained += one[bins] if not falls or relative is None else one[bins] * relative**k
@@ -110,7 +110,7 @@ def _folded(
     # Parts in which the harmonic is weak contain little information and have little weight.
     known = 1.0 / np.sum(share**2, axis=0)
     scatter = np.sum(share**2 * np.abs(each - mean) ** 2, axis=0) * known / np.maximum(known - 1.0, 1e-9)
-    variance = np.maximum(scatter, 4.0 * residual.noise_m**2 / own.sum(axis=0))
+    variance = np.maximum(scatter, 4.0 * residual.noise**2 / own.sum(axis=0))
     judged = (known > 2.0) & (variance > 0.0)
     f = np.abs(mean) ** 2 / np.where(judged, variance, 1.0)
     chance = np.where(judged, (1.0 + f / np.where(judged, known - 1.0, 1.0)) ** (1.0 - known), 1.0)

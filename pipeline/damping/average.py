@@ -30,7 +30,7 @@ class Weighted:
     weight: float
 
 
-def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, ...]:
+def average_over_laws(damping: Damping, amplitude: float) -> tuple[Weighted, ...]:
     """Return the laws over which quantities are averaged, first the law whose coefficients are stated.
 
     A stated law that is selected is the only one. ``amplitude_m`` is the mean amplitude of the record.
@@ -59,7 +59,7 @@ def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, .
     first = damping.selected
     if mixed is not None and not mixed.rejected:
         found = [(fit, bic + OUTSIDE) for fit, bic in found if not _in_family(fit.law)]
-        found.append((_with_prior(mixed, damping.of_powers(1), amplitude_m), mixed.bic))
+        found.append((_with_prior(mixed, damping.of_powers(1), amplitude), mixed.bic))
         if _in_family(damping.best.law) or (mixed.name in damping.admissible and isinstance(damping.best.law, Drag)):
             first = mixed.name
     found.sort(key=lambda one: one[0].name != first)
@@ -91,12 +91,12 @@ def scaled(fit: LawFit) -> LawFit:
     return replace(fit, joint=replace(fit.joint, covariance=fit.reduced_chi2 * fit.joint.covariance))
 
 
-def _with_prior(mixed: LawFit, linear: LawFit | None, amplitude_m: float) -> LawFit:
+def _with_prior(mixed: LawFit, linear: LawFit | None, amplitude: float) -> LawFit:
     """Return the fit of both drags combined with the prior."""
     if linear is None:
         return mixed
     gamma = linear.joint["gamma"]
-    tau = SPREAD_OF_POWER * math.hypot(gamma.value, gamma.u) / amplitude_m
+    tau = SPREAD_OF_POWER * math.hypot(gamma.value, gamma.u) / amplitude
     share = 1.0 / (1.0 + (mixed.joint["beta"].u / tau) ** 2) if tau > 0.0 else 0.0
     values, covariance = np.zeros(3), np.zeros((3, 3))
     # If chi-square rejected the exponential, its covariance was widened. Here it is part of a law that fits.

@@ -208,8 +208,8 @@ def choose(fits: Mapping[str, LawFit], evidence: float, span: Callable[[str], F8
     reach = [name for name in order if fits[name].bic - least <= evidence]
     idle = {n for n in reach if selected in fits[n].law.cases and fits[n].bic - best.bic > BARE_MENTION}
     if idle:
-        most, least_m = span(selected)
-        amplitudes = most * np.array([1.0, min(max(least_m / most, NEGLIGIBLE), 1.0 / 3.0)])
+        most, smallest_amplitude = span(selected)
+        amplitudes = most * np.array([1.0, min(max(smallest_amplitude / most, NEGLIGIBLE), 1.0 / 3.0)])
         alone, _ = best.rates(amplitudes)
         for name in sorted(idle):
             rate, u = fits[name].rates(amplitudes)

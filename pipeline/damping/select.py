@@ -16,7 +16,7 @@ from pipeline.numerics.levels import OUTLIER, STRONG
 from pipeline.numerics.regression import Scatter, chi2_quantile, correlation_length, scatter
 from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8
-from pipeline.windows.demodulate import ROUNDING, Demodulated
+from pipeline.windows.demodulate import ROUNDING, Windows
 
 FEW_LAWS = ("none", "linear", "quadratic", "linear+quadratic")  # those of the tier "fast"
 DOUBT = 0.01  # probability with which a record that follows one of the few laws still causes all to be tried
@@ -74,7 +74,7 @@ class Damping:
 
 
 def fit_laws(
-    windows: Demodulated,
+    windows: Windows,
     t0: float,
     laws: Sequence[str | Law] = tuple(LAWS),
     stated: str | Law | None = None,
@@ -165,7 +165,15 @@ def _fit_laws(points: _Points, t0: float, wanted: Sequence[str | Law], known: La
     fits = _with_growth(fits)
     stated = "" if known is None else known.name
     selected, admissible = select_law(fits, stated, float(points.t[-1]))
-    return Damping(t0, fits, selected, admissible, points.spread, unfitted, stated)
+    return Damping(
+        t0=t0,
+        fits=fits,
+        selected=selected,
+        admissible=admissible,
+        scatter=points.spread,
+        unfitted=unfitted,
+        stated=stated,
+    )
 
 
 def _with_growth(fits: dict[str, LawFit]) -> dict[str, LawFit]:

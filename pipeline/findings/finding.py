@@ -9,8 +9,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from pipeline.numerics.quantity import amount, noun, number, plural
-from pipeline.registry.found import Found, Severity
+from pipeline.notice import Notice, Severity
+from pipeline.units import amount, noun, number, plural
 
 RANK = {"error": 0, "warning": 1, "info": 2}
 
@@ -18,11 +18,11 @@ RANK = {"error": 0, "warning": 1, "info": 2}
 UNKNOWN_CODE = "unknown_code"
 
 # Unit and usual form of a number whose name ends so; one that ends in _m has the unit of the recording.
-UNITS = {"_s": ("s", ".3g"), "_hz": ("Hz", ".4g"), "_metres": ("m", ".3g"), "_rad": ("rad", ".2g")}
+SUFFIXES = {"_s": ("s", ".3g"), "_hz": ("Hz", ".4g"), "_metres": ("m", ".3g"), "_rad": ("rad", ".2g")}
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class FindingKind:
     """The block of one code in ``findings.toml``, which explains each field."""
 
     symptom: str
@@ -35,6 +35,8 @@ class Kind:
     advice: tuple[str, ...] = ("",)
     figure: str = ""
     harm: str = "uncertainty"
+    doubts: tuple[str, ...] = ()
+    doubts_above: Mapping[str, float] = field(default_factory=dict)
     about: tuple[str, ...] = ()
     consequence: str | None = None
 
@@ -56,30 +58,31 @@ class Finding:
 
 
 @cache
-def kinds() -> Mapping[str, Kind]:
+def kinds() -> Mapping[str, FindingKind]:
     """Return the blocks of ``findings.toml`` by code, in its order."""
     import tomllib
 
     blocks = tomllib.loads(Path(__file__).with_name("findings.toml").read_text(encoding="utf-8"))
     return {
-        code: Kind(**{name: _field(name, value) for name, value in block.items()}) for code, block in blocks.items()
+        code: FindingKind(**{name: _field(name, value) for name, value in block.items()})
+        for code, block in blocks.items()
     }
 
 
 def _field(name: str, value: Any) -> Any:
-    if name in ("severity", "says", "details", "advice", "about"):
+    if name in ("severity", "says", "details", "advice", "doubts", "about"):
         return (value,) if isinstance(value, str) else tuple(value)
     return value
 
 
-def word(found: Found, unit: str = "m") -> Finding:
+def word(found: Notice, unit: str = "m") -> Finding:
     """Put into words what a stage found in a recording whose values have this unit."""
     kind = kinds()[found.code]
     severity = found.severity or kind.severity[0]
     if severity not in kind.severity:
         raise ValueError(f"finding {found.code!r} has no severity {severity!r} in findings.toml")
     numbers = {name: each for name, each in found.numbers.items() if each is not None}
-    shown = {name: _Shown(name, each, unit) for name, each in numbers.items()}
+    shown = {name: _Number(name, each, unit) for name, each in numbers.items()}
     return Finding(
         found.code,
         severity,
@@ -93,10 +96,10 @@ def word(found: Found, unit: str = "m") -> Finding:
 def usual_advice(code: str) -> str:
     """Return what to do about a finding of the example, in a recording of a length."""
     kind = kinds()[code]
-    return word(Found(code, kind.example, kind.severity[-1])).advice or kind.advice[-1]
+    return word(Notice(code, kind.example, kind.severity[-1])).advice or kind.advice[-1]
 
 
-def worded(unit: str, *groups: Iterable[Found]) -> tuple[Finding, ...]:
+def worded(unit: str, *groups: Iterable[Notice]) -> tuple[Finding, ...]:
     """Put all that was found into words, the most severe first."""
     return by_severity(word(found, unit) for group in groups for found in group)
 
@@ -106,7 +109,7 @@ def by_severity(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     return tuple(sorted(findings, key=lambda finding: RANK[finding.severity]))
 
 
-def _filled(sentences: Sequence[str], shown: Mapping[str, _Shown], unit: str) -> list[str]:
+def _filled(sentences: Sequence[str], shown: Mapping[str, _Number], unit: str) -> list[str]:
     """Return the sentences whose numbers are all there, with the numbers in their places."""
     rest = "rest position" if unit in ("m", "rad") else f"mean {noun(unit)}"
     echoes = {"echoes": "false echoes"} if unit == "m" else {}  # nothing else has any
@@ -118,7 +121,7 @@ def _names(sentence: str) -> set[str]:
     return {name for _, name, _, _ in string.Formatter().parse(sentence) if name}
 
 
-class _Shown(NamedTuple):
+class _Number(NamedTuple):
     """A number that a sentence shows with its unit."""
 
     name: str
@@ -132,7 +135,7 @@ class _Shown(NamedTuple):
             return f"{number(100.0 * self.value, f'{form[:-1]}.2g')} %"
         if self.name.endswith("_m"):
             return amount(self.value, self.unit, form or ".2g")
-        for end, (symbol, usual) in UNITS.items():
+        for end, (symbol, usual) in SUFFIXES.items():
             if self.name.endswith(end):
                 return f"{number(self.value, form or usual)} {symbol}"
         if not form and self.value > 1e6:

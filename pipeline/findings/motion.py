@@ -11,120 +11,120 @@ from pipeline.bench.spring import GRAVITY_M_PER_S2
 from pipeline.damping.law_fit import LawFit
 from pipeline.damping.laws import words_of
 from pipeline.damping.select import Damping
-from pipeline.motion.averaged import Fitted, Rest
 from pipeline.motion.by_samples import FEW_WINDOWS
-from pipeline.motion.overdamped import Overdamped
+from pipeline.motion.fitted import Fitted, Rest
+from pipeline.motion.relaxation import Relaxation
+from pipeline.notice import Notice
 from pipeline.numerics.levels import NOTICEABLE, VERY_STRONG
-from pipeline.numerics.quantity import amount, number
-from pipeline.registry.found import Found
+from pipeline.units import amount, number
 from pipeline.windows.cycles import Cycles
 from pipeline.windows.demodulate import model_error
 
 
-def overdamped_findings(found: Overdamped) -> Iterator[Found]:
+def relaxation_findings(found: Relaxation) -> Iterator[Notice]:
     """Yield what damping does that ends a motion within a few cycles, or before one cycle is complete."""
     if found.kind == "strong":
-        yield Found("strongly_damped", {"damping_ratio": found.damping_ratio.value, "why": found.why})
+        yield Notice("strongly_damped", {"damping_ratio": found.damping_ratio.value, "why": found.why})
     else:
         rates = {name: x.value for name, x in found.estimates.items() if name.startswith("relaxation_rate")}
-        yield Found("overdamped", {**rates, "why": found.why})
+        yield Notice("overdamped", {**rates, "why": found.why})
 
 
-def fit_findings(fitted: Fitted, misfit: str) -> Iterator[Found]:
+def fit_findings(fitted: Fitted, misfit: str) -> Iterator[Notice]:
     """Yield what the fits of the samples came to; ``misfit`` says why the equation of motion was not fitted."""
     if fitted.method == "equation":
-        yield Found("strongly_damped", {"why": fitted.why})
+        yield Notice("strongly_damped", {"why": fitted.why})
     elif fitted.why:
-        yield Found("not_converged", {"tried": fitted.why})
+        yield Notice("not_converged", {"tried": fitted.why})
     if misfit:
-        yield Found("not_converged", {"why": misfit})
+        yield Notice("not_converged", {"why": misfit})
 
 
-def motion_findings(cycles: Cycles, fitted: Fitted) -> Iterator[Found]:
+def motion_findings(cycles: Cycles, fitted: Fitted) -> Iterator[Notice]:
     """Yield what the fit shows of the motion."""
-    demodulated, phase, rest = fitted.demodulated, fitted.phase, fitted.rest
-    windows, omega = demodulated.t.size, phase.angular_frequency.value
-    if windows < FEW_WINDOWS:
-        yield Found("short_record", {"periods": cycles.count, "windows": windows})
-    if demodulated.lost:
-        lost = {"periods": demodulated.lost, "all_periods": demodulated.lost + windows}
-        yield Found("missing_samples", lost, "warning")
+    windows, phase, rest = fitted.windows, fitted.phase, fitted.rest
+    count, omega = windows.t.size, phase.angular_frequency.value
+    if count < FEW_WINDOWS:
+        yield Notice("short_record", {"periods": cycles.count, "windows": count})
+    if windows.lost:
+        lost = {"periods": windows.lost, "all_periods": windows.lost + count}
+        yield Notice("missing_samples", lost, "warning")
     if phase.backbone is not None:
         start, shift = fitted.first_shift(phase.backbone.value)
         # In computed data drag itself shifts the frequency, by the square of the decrease of the amplitude in a radian.
         if abs(shift) > (fitted.damping.best.rate_at_start() / omega) ** 2:
             numbers = {"relative_shift": shift, "amplitude_m": start}
-            yield Found("amplitude_dependent_frequency", {**numbers, "higher" if shift > 0 else "lower": abs(shift)})
+            yield Notice("amplitude_dependent_frequency", {**numbers, "higher" if shift > 0 else "lower": abs(shift)})
     # In computed data, changes of the rest position below the error of the sinusoidal model affect no number.
-    errors = model_error(demodulated.amplitude, demodulated.decay, demodulated.angular_frequency)
-    if rest.drifts and rest.drift_m > float(np.max(errors)):
+    errors = model_error(windows.amplitude, windows.decay, windows.angular_frequency)
+    if rest.drifts and rest.drift > float(np.max(errors)):
         yield _rest_drift(rest, fitted.damping.best.damping_rate().u)
     if rest.mean.unit == "m/s^2":
-        yield Found("one_axis")
+        yield Notice("one_axis")
     yield from _modes(fitted, rest.mean.unit)
 
 
-def _rest_drift(rest: Rest, u_rate: float) -> Found:
-    numbers = {"drift_m": rest.drift_m}
+def _rest_drift(rest: Rest, u_rate: float) -> Notice:
+    numbers = {"drift_m": rest.drift}
     if rest.mean.unit == "m" and rest.mean.value > 0.0:
-        share, seconds = rest.drift_m / rest.mean.value, float(np.ptp(rest.t))
+        share, seconds = rest.drift / rest.mean.value, float(np.ptp(rest.t))
         if share >= u_rate * seconds:
             numbers |= {"scale_change": share, "damping_rate_error": share / seconds}
-    return Found("rest_drift", numbers)
+    return Notice("rest_drift", numbers)
 
 
-def _modes(fitted: Fitted, unit: str) -> Iterator[Found]:
-    disturbances, main = fitted.disturbances, fitted.phase.angular_frequency.value / (2.0 * math.pi)
-    own = [mode for mode in disturbances.sideways.modes if mode.kind == "mode"]
+def _modes(fitted: Fitted, unit: str) -> Iterator[Notice]:
+    modes, main = fitted.modes, fitted.phase.angular_frequency.value / (2.0 * math.pi)
+    own = [mode for mode in modes.members if mode.kind == "mode"]
     if not own:
         return
-    f, size_m = own[0].frequency_hz, own[0].amplitude_m
-    large = size_m > NOTICEABLE * float(np.median(fitted.demodulated.amplitude))
-    further = ", ".join(f"{amount(m.amplitude_m, unit)} at {m.frequency_hz:.4g} Hz" for m in own[1:])
+    f, size = own[0].frequency_hz, own[0].amplitude
+    large = size > NOTICEABLE * float(np.median(fitted.windows.amplitude))
+    further = ", ".join(f"{amount(m.amplitude, unit)} at {m.frequency_hz:.4g} Hz" for m in own[1:])
     numbers = {
         "frequency_hz": f,
-        "amplitude_m": size_m,
+        "amplitude_m": size,
         "beat_s": 1.0 / abs(f - main),
         "modes": len(own),
         "pendulum_metres": GRAVITY_M_PER_S2 / (2.0 * math.pi * f) ** 2 if f < main and unit == "m" else None,
         "further": further or None,
     }
-    yield Found("sideways_mode", numbers, "warning" if disturbances.modelled and large else "info")
+    yield Notice("sideways_mode", numbers, "warning" if modes.subtracted is not None and large else "info")
 
 
-def damping_findings(damping: Damping) -> Iterator[Found]:
+def damping_findings(damping: Damping) -> Iterator[Notice]:
     """Yield which laws fit, which do not, and which cannot be distinguished."""
     rejected = [name for name, fit in damping.fits.items() if fit.rejected]
     if damping.fits and len(rejected) == len(damping.fits):
         nearest = min(damping.fits.values(), key=lambda fit: fit.reduced_chi2) if damping.by_statement else damping.best
-        yield Found("no_law_fits", {"reduced_chi2": nearest.reduced_chi2, "nearest": words_of(nearest.law)})
+        yield Notice("no_law_fits", {"reduced_chi2": nearest.reduced_chi2, "nearest": words_of(nearest.law)})
     elif damping.growth_rate:
-        yield Found("growing", {"growth_rate": damping.growth_rate})
+        yield Notice("growing", {"growth_rate": damping.growth_rate})
     elif damping.stated:
         yield from _stated_law(damping)
     if rejected or damping.unfitted:
         unfitted = len(damping.unfitted)
         numbers = {"rejected": len(rejected) + unfitted, "tried": len(damping.fits) + unfitted}
-        yield Found("law_rejected", {**numbers, **_reasons(damping)})
+        yield Notice("law_rejected", {**numbers, **_reasons(damping)})
     if len(damping.admissible) > 1:
         laws = [damping.fits[name].law for name in damping.admissible]
         undamped = next((words_of(law) for law in laws if len(law.parameters) == 1), None)
         names = ", ".join(words_of(law) for law in laws)
-        yield Found("laws_not_separable", {"laws": len(laws), "names": names, "undamped": undamped})
+        yield Notice("laws_not_separable", {"laws": len(laws), "names": names, "undamped": undamped})
 
 
-def _stated_law(damping: Damping) -> Iterator[Found]:
+def _stated_law(damping: Damping) -> Iterator[Notice]:
     """Yield that a stated law was not fitted, that chi-square rejects it, or that another law beats it."""
     if not damping.by_statement:
         why = damping.unfitted.get(damping.stated, "its fit failed")
-        yield Found("stated_law_rejected", {"law": damping.stated, "why": why})
+        yield Notice("stated_law_rejected", {"law": damping.stated, "why": why})
         return
     best = damping.best
     other = min((fit for fit in damping.fits.values() if not fit.rejected), key=lambda fit: fit.bic, default=best)
     excess = best.bic - other.bic
     if best.rejected or excess > VERY_STRONG:
         numbers = {"reduced_chi2": best.reduced_chi2, "other_chi2": other.reduced_chi2, "bic_excess": excess}
-        yield Found("stated_law_rejected", {**numbers, "law": best.name, "other": other.name})
+        yield Notice("stated_law_rejected", {**numbers, "law": best.name, "other": other.name})
 
 
 def _reasons(damping: Damping) -> dict[str, str]:

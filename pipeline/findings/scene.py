@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import HEAVIEST_SHARE
-from pipeline.registry.found import Found
+from pipeline.notice import Notice
 from pipeline.results.effects import Effect
 
 
-def scene_findings(scene: Scene, effects: tuple[Effect, ...], *, constant: bool = True) -> Iterator[Found]:
+def scene_findings(scene: Scene, effects: tuple[Effect, ...], *, constant: bool = True) -> Iterator[Notice]:
     """Yield what is missing or implausible in a scene; the effects say whether the mass of the spring counts.
 
     ``constant`` says whether a spring constant is derived: the angle of a pendulum gives none.
@@ -29,8 +29,8 @@ def scene_findings(scene: Scene, effects: tuple[Effect, ...], *, constant: bool 
     exact = [name for name, estimate in used.items() if estimate is not None and estimate.u == 0]
     if unusual := scene.unusual():
         said = [clause if clause.endswith("?") else f"{clause}." for clause in unusual]
-        yield Found("scene_implausible", {"first": said[0], "more": len(said) - 1 or None, "all": " ".join(said)})
+        yield Notice("scene_implausible", {"first": said[0], "more": len(said) - 1 or None, "all": " ".join(said)})
     if constant and scene.bob_mass_kg is not None and scene.spring_mass_kg is None:
-        yield Found("spring_mass_missing", {"heaviest": HEAVIEST_SHARE})
+        yield Notice("spring_mass_missing", {"heaviest": HEAVIEST_SHARE})
     if exact:
-        yield Found("uncertainty_missing", {"inputs": ", ".join(exact)})
+        yield Notice("uncertainty_missing", {"inputs": ", ".join(exact)})

@@ -10,16 +10,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 
 import numpy as np
 
 from pipeline.damping.law_fit import LawFit
 from pipeline.damping.laws import Law
 from pipeline.damping.select import Damping
+from pipeline.modes.mode import Modes
+from pipeline.motion.fitted import Fitted, Phase, Rest, TimeTable, Waveform, delay, wrapped
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_LINE, NOTICEABLE, VERY_STRONG
-from pipeline.numerics.quantity import Unit
+from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_LINE, VERY_STRONG
 from pipeline.numerics.regression import (
     Line,
     Scatter,
@@ -30,114 +31,20 @@ from pipeline.numerics.regression import (
     solve_weighted,
 )
 from pipeline.track import F8, UNUSABLE
+from pipeline.units import Unit
 from pipeline.windows.cycles import NoOscillation
-from pipeline.windows.demodulate import ROUNDING, Demodulated
-from pipeline.windows.disturbances import Disturbances
-
-Table = tuple[F8, F8]  # values at ascending times, s
+from pipeline.windows.demodulate import ROUNDING, Windows
 
 BACKBONE = Unit(-2, -1, radian=1)  # of the coefficient by which the frequency depends on the squared amplitude
 # Number of points in the tables of the lag and of the integral of the squared amplitude. If that falls by e^10 within a
 # table, the trapezoidal rule errs by h^2/12 = 2e-6: P. J. Davis, P. Rabinowitz, "Methods of Numerical Integration"
 # (1984).
-POINTS = 2049
+TABLE_POINTS = 2049
 # Nodes of the quadrature of the decay rate over amplitudes, exact up to the power 15 (the same book, (1984)).
 NODES = 8
 # Maximum lag in rad by averaging (Bogoliubov and Mitropolsky (1961)): that of friction which halves the amplitude
 # within one radian.
 MOST_LAG = 0.75
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Phase:
-    """Total phase against time: a straight line, a backbone if one shows, less the lag of a period's sinusoid."""
-
-    t0: float  # time of the start, s
-    angular_frequency: Estimate  # mean over the record: the slope of a straight line through the phases
-    phase: Estimate  # at t0, wrapped into (-pi, pi]
-    backbone: Estimate | None  # kappa of omega(A) = omega + kappa A^2; None if it is not significant
-    reduced_chi2: float
-    correlation: float  # of the straight line's residuals, as a number of windows
-    residual: F8  # (w,) phases minus the straight line, rad
-    coefficients: F8  # of 1, of t - middle and, with a backbone, of the integral of A^2
-    middle: float  # weighted mean time, s
-    area: Table | None = None  # integral of A^2 from the middle; with a backbone
-    lag: Table | None = None  # delay of a period's sinusoid, rad; None if it is constant
-    small_swings: Estimate | None = None  # angular frequency of very small swings; with a backbone
-    squared_rate: float | None = None  # decrease of the squared frequency by drag, 1/s^2; None: that of the windows
-
-    def total(self, t: F8) -> F8:
-        """Return the total phase in rad at times t (n,)."""
-        level, slope, *bend = self.coefficients.tolist()
-        total = level + slope * (t - self.middle)
-        if self.area is not None:
-            total += bend[0] * np.interp(t, *self.area)
-        return np.asarray(total - _delay(t, self.lag))
-
-    def rate(self, amplitude: F8) -> F8:
-        """Return the angular frequency in rad/s at amplitudes (n,)."""
-        bend = self.coefficients[2] if self.area is not None else 0.0
-        return np.asarray(self.coefficients[1] + bend * amplitude**2)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Rest:
-    """The rest position: its mean, and a smooth curve through the windows that counts if it ``drifts``."""
-
-    mean: Estimate
-    drift_m: float  # peak-to-peak range of the curve
-    drifts: bool  # whether the curve fits much better than a constant
-    t: F8  # (w,) centres of the windows, s
-    curve: F8  # (w,) m
-
-    def at(self, t: F8) -> F8:
-        """Return the rest position in m at times t (n,)."""
-        return np.interp(t, self.t, self.curve) if self.drifts else np.full(t.size, self.mean.value)
-
-
-@dataclass(frozen=True, eq=False)
-class Waveform:
-    """The fitted motion at every sample; its residual contains everything that the model does not describe."""
-
-    position: F8  # (n,) m
-    moving: Callable[[], F8]
-    residual: F8  # (n,) distance minus position, NaN where none was measured
-    rms_m: float  # root mean square of the residual over the samples used
-
-    @cached_property
-    def velocity(self) -> F8:
-        """Velocity of the oscillation (n,) in m/s, calculated on first use, as only figures need it."""
-        return self.moving()
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Fitted:
-    """An oscillation in the form that the stages after the fit use."""
-
-    demodulated: Demodulated  # the windows, with the final flags
-    disturbances: Disturbances  # what was subtracted from the record before the fit
-    damping: Damping
-    phase: Phase
-    rest: Rest
-    waveform: Waveform  # including the disturbances
-    method: str  # "windows", "samples" or "equation"
-    why: str  # what a method that failed, or the equation of motion, came to
-
-    def first_shift(self, kappa: float) -> tuple[float, float]:
-        """Return the first amplitude, and the shift of the frequency from very small swings to it, over the frequency.
-
-        A large shift that the first windows do not show to half its size does not grow with the square of the
-        amplitude; then it is theirs, at their mean amplitude.
-        """
-        windows, omega, small = self.demodulated, self.phase.angular_frequency.value, self.phase.small_swings
-        start = self.damping.best.joint["A0"].value
-        shift, last = kappa * start**2 / omega, max(2, windows.t.size // 20)
-        if small is None or abs(shift) < NOTICEABLE or last >= windows.t.size:
-            return start, shift
-        mean = float(np.mean(windows.amplitude[: last + 1]))
-        turned, passed = (float(each[last] - each[0]) for each in (windows.phase, windows.t))
-        shown = turned / passed / small.value - 1.0
-        return (mean, shown) if abs(shown) < 0.5 * abs(kappa) * mean**2 / omega else (start, shift)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -150,8 +57,8 @@ class Averaged:
     middle: float
     reach: float  # largest distance of a sample from the middle, s
     degree: int  # of the polynomial of the rest position
-    area: Table | None
-    lag: Table | None
+    area: TimeTable | None
+    lag: TimeTable | None
 
     def split(self, values: F8) -> tuple[F8, F8, F8]:
         """Return the parameters of law, phase and rest position."""
@@ -168,7 +75,7 @@ class Averaged:
         theta, turning, still = self.split(values)
         amplitude, by_theta = self.law.curve(np.clip(t, self.t0, self.last) - self.t0, theta)
         turns, rest = _turns(t, self.middle, self.area), self.rest(t)
-        angle = turns @ turning - _delay(t, self.lag)
+        angle = turns @ turning - delay(t, self.lag)
         cosine = np.cos(angle)
 
         def slopes() -> F8:
@@ -182,21 +89,19 @@ class Averaged:
         return amplitude * cosine + rest @ still, slopes
 
 
-def fit_windows(windows: Demodulated, disturbances: Disturbances, damping: Damping) -> Fitted:
+def fit_windows(windows: Windows, modes: Modes, damping: Damping) -> Fitted:
     """Fit phase and rest position to the windows, whose amplitudes gave the laws."""
-    samples = disturbances.conditioned
+    samples = modes.samples
     track, flags = samples.track, windows.flags
     last = float(np.max(track.t, where=(flags & UNUSABLE) == 0, initial=-np.inf))
     phase = fit_phase(windows, damping, last)
     rest = fit_rest(windows, track.unit)
-    return assembled(windows, disturbances, damping, phase, rest, "windows")
+    return assembled(windows, modes, damping, phase, rest, "windows")
 
 
-def assembled(
-    windows: Demodulated, disturbances: Disturbances, damping: Damping, phase: Phase, rest: Rest, method: str
-) -> Fitted:
+def assembled(windows: Windows, modes: Modes, damping: Damping, phase: Phase, rest: Rest, method: str) -> Fitted:
     """Return the fitted oscillation with its waveform: rest position, amplitude and phase at every sample."""
-    track = disturbances.conditioned.track
+    track = modes.samples.track
     used = (windows.flags & UNUSABLE) == 0
     # A law is valid only where it was fitted: before the first and after the last sample used it is held constant.
     last = float(np.max(track.t, where=used, initial=-np.inf))
@@ -207,10 +112,12 @@ def assembled(
     residual = track.y - position
     left = residual if used.all() else residual[used]
 
-    rms_m = math.sqrt(float(left @ left) / left.size)
-    whole = position + disturbances.position if disturbances else position
-    waveform = Waveform(whole, partial(_velocity, best, phase, amplitude, angle), residual, rms_m)
-    return Fitted(windows, disturbances, damping, phase, rest, waveform, method, "")
+    rms = math.sqrt(float(left @ left) / left.size)
+    whole = position if modes.subtracted is None else position + modes.subtracted
+    waveform = Waveform(whole, partial(_velocity, best, phase, amplitude, angle), residual, rms)
+    return Fitted(
+        windows=windows, modes=modes, damping=damping, phase=phase, rest=rest, waveform=waveform, method=method, why=""
+    )
 
 
 def _velocity(best: LawFit, phase: Phase, amplitude: F8, angle: F8) -> F8:
@@ -218,7 +125,7 @@ def _velocity(best: LawFit, phase: Phase, amplitude: F8, angle: F8) -> F8:
     return np.asarray(growth * np.cos(angle) - amplitude * phase.rate(amplitude) * np.sin(angle))
 
 
-def fit_phase(windows: Demodulated, damping: Damping, last: float) -> Phase:
+def fit_phase(windows: Windows, damping: Damping, last: float) -> Phase:
     """Fit a constant frequency to the windows' phases and test it against one that depends on amplitude.
 
     The reported frequency is the record's mean, whether or not the frequency varies. If the residuals of the straight
@@ -231,7 +138,7 @@ def fit_phase(windows: Demodulated, damping: Damping, last: float) -> Phase:
     if t.size < 2:
         return _single(windows, t0, float(noise[0]))
     lag = lag_of(damping.best, t0, windows)
-    phase = windows.phase + _delay(t, lag)
+    phase = windows.phase + delay(t, lag)
     spread = scatter(t, phase - windows.angular_frequency * (t - t[0]), noise)
     kept = spread.kept
     u = spread.u[kept]
@@ -247,7 +154,7 @@ def fit_phase(windows: Demodulated, damping: Damping, last: float) -> Phase:
     widened, length = _widening(straight, u, spread)
     covariance = straight.covariance * widened
     first = np.array([t0])
-    at_start = float((_turns(first, middle, area) @ model.values - _delay(first, lag))[0])
+    at_start = float((_turns(first, middle, area) @ model.values - delay(first, lag))[0])
     start, free = _turns(first, middle, None)[0], max(u.size - model.values.size, 1)
     backbone = small = None
     if area is not None:
@@ -255,34 +162,34 @@ def fit_phase(windows: Demodulated, damping: Damping, last: float) -> Phase:
         small = Estimate(float(model.values[1]), float(u_bent[1]), "rad/s")
         backbone = Estimate(float(model.values[2]), float(u_bent[2]), BACKBONE.of(damping.best.joint.units[0]))
     return Phase(
-        t0,
-        Estimate(float(straight.values[1]), math.sqrt(covariance[1, 1]), "rad/s"),
-        Estimate(wrapped(at_start), math.sqrt(float(start @ covariance @ start)), "rad"),
-        backbone,
-        model.chi2 / free,
-        length,
-        phase - line @ straight.values,
-        model.values,
-        middle,
-        area,
-        lag,
-        small,
+        t0=t0,
+        angular_frequency=Estimate(float(straight.values[1]), math.sqrt(covariance[1, 1]), "rad/s"),
+        phase=Estimate(wrapped(at_start), math.sqrt(float(start @ covariance @ start)), "rad"),
+        backbone=backbone,
+        reduced_chi2=model.chi2 / free,
+        correlation=length,
+        residual=phase - line @ straight.values,
+        coefficients=model.values,
+        middle=middle,
+        area=area,
+        lag=lag,
+        small_swings=small,
     )
 
 
-def _single(windows: Demodulated, t0: float, noise: float) -> Phase:
+def _single(windows: Windows, t0: float, noise: float) -> Phase:
     """Return the phase of a single window: its frequency is that of the spectrum, uncertain by half a line width."""
     t, omega, own = float(windows.t[0]), windows.angular_frequency, float(windows.phase[0])
     return Phase(
-        t0,
-        Estimate(omega, math.pi / max(2.0 * (t - t0), 1e-9), "rad/s"),
-        Estimate(wrapped(own + omega * (t0 - t)), math.hypot(noise, 0.5 * math.pi), "rad"),
-        None,
-        math.nan,
-        1.0,
-        np.zeros(1),
-        np.array([own, omega]),
-        t,
+        t0=t0,
+        angular_frequency=Estimate(omega, math.pi / max(2.0 * (t - t0), 1e-9), "rad/s"),
+        phase=Estimate(wrapped(own + omega * (t0 - t)), math.hypot(noise, 0.5 * math.pi), "rad"),
+        backbone=None,
+        reduced_chi2=math.nan,
+        correlation=1.0,
+        residual=np.zeros(1),
+        coefficients=np.array([own, omega]),
+        middle=t,
     )
 
 
@@ -296,7 +203,7 @@ def _widening(line: Line, u: F8, spread: Scatter) -> tuple[float, float]:
     return length * (line.chi2 / free if too_large else 1.0), length
 
 
-def _turns(t: F8, middle: float, area: Table | None) -> F8:
+def _turns(t: F8, middle: float, area: TimeTable | None) -> F8:
     """Return the columns of the phase: 1, the time from the middle and, with a backbone, the integral of A^2."""
     columns = [np.ones(t.size), t - middle]
     if area is not None:
@@ -304,11 +211,7 @@ def _turns(t: F8, middle: float, area: Table | None) -> F8:
     return np.stack(columns, axis=1)
 
 
-def _delay(t: F8, lag: Table | None) -> F8 | float:
-    return 0.0 if lag is None else np.interp(t, *lag)
-
-
-def lag_of(fit: LawFit, t0: float, windows: Demodulated) -> Table | None:
+def lag_of(fit: LawFit, t0: float, windows: Windows) -> TimeTable | None:
     """Return the delays in rad that drag causes in a period's fitted sinusoid; None if they are constant.
 
     Drag acts mainly while the bob is fast. A period is therefore not exactly sinusoidal, and the first harmonic of its
@@ -321,7 +224,7 @@ def lag_of(fit: LawFit, t0: float, windows: Demodulated) -> Table | None:
     For friction the lag is :math:`3\\delta/\\pi A`, where :math:`2\\delta` is the loss of amplitude per half-cycle.
     Near the stop the formula fails; the lag is limited to its value where half of the amplitude is lost per radian.
     """
-    t = np.linspace(t0, max(float(np.max(windows.t)), t0 + 1e-9), POINTS)
+    t = np.linspace(t0, max(float(np.max(windows.t)), t0 + 1e-9), TABLE_POINTS)
     amplitude = np.abs(fit.amplitude(t - t0))
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
     below = amplitude[:, None] * 0.5 * (nodes + 1.0)
@@ -334,18 +237,18 @@ def lag_of(fit: LawFit, t0: float, windows: Demodulated) -> Table | None:
     return (t, lag) if float(np.ptp(lag)) > 1e-12 else None
 
 
-def area_of(law: Law, theta: F8, t0: float, middle: float, last: float) -> Table:
+def area_of(law: Law, theta: F8, t0: float, middle: float, last: float) -> TimeTable:
     """Return the integral of A^2 from the middle, from t0 to the last time."""
     from scipy.integrate import cumulative_trapezoid
 
-    grid = np.linspace(t0, max(last, t0 + 1e-9), POINTS)
+    grid = np.linspace(t0, max(last, t0 + 1e-9), TABLE_POINTS)
     power = law.curve(grid - t0, theta)[0] ** 2
     power[~np.isfinite(power)] = 0.0
     integral = cumulative_trapezoid(power, grid, initial=0.0)
     return grid, np.asarray(integral - np.interp(middle, grid, integral))
 
 
-def fit_rest(windows: Demodulated, unit: str) -> Rest:
+def fit_rest(windows: Windows, unit: str) -> Rest:
     """Fit a constant and a polynomial to the windows' rest positions, and decide by BIC whether they drift."""
     t, offset = windows.t, windows.offset
     u = np.maximum(np.sqrt(windows.covariance[:, 2, 2]), 1e-15 * float(np.max(np.abs(offset))) + 1e-100)
@@ -360,19 +263,13 @@ def fit_rest(windows: Demodulated, unit: str) -> Rest:
     return Rest(estimate, float(np.ptp(curve)), gain > VERY_STRONG, t, curve)
 
 
-def wrapped(angle: float) -> float:
-    """Return the angle in rad wrapped into (-pi, pi]."""
-    turned = math.remainder(angle, 2.0 * math.pi)
-    return math.pi if turned == -math.pi else turned
-
-
 def check_coherence(fitted: Fitted, typical: float) -> NoOscillation | None:
     """Return why a motion is no oscillation, although single periods look like one; None if it is one.
 
     Amplitude and phase of a window form a phasor. Weighted by length, half of the phasors must differ from what the fit
     predicts by less than their own length, ``typical``, as random phasors do not.
     """
-    if typical < 1.0 or fitted.demodulated.t.size < FEWEST_FOR_LINE:
+    if typical < 1.0 or fitted.windows.t.size < FEWEST_FOR_LINE:
         return None
     return NoOscillation(
         f"no period lasts: half of the motion misses one oscillation by {typical:.0%} of its amplitude or more"
@@ -381,7 +278,7 @@ def check_coherence(fitted: Fitted, typical: float) -> NoOscillation | None:
 
 def typical_miss(fitted: Fitted) -> float:
     """Return the median difference of windows from the fitted oscillation, over their amplitudes, weighted by these."""
-    windows, phase = fitted.demodulated, fitted.phase
+    windows, phase = fitted.windows, fitted.phase
     expected = fitted.damping.best.amplitude(windows.t - phase.t0) * np.exp(1j * phase.total(windows.t))
     own = windows.amplitude * np.exp(1j * windows.phase)
     size = np.abs(own)

@@ -11,15 +11,16 @@ import numpy as np
 from pipeline.damping.law_fit import LawFit, joint_of
 from pipeline.damping.laws import LAWS, Law
 from pipeline.damping.select import Damping
-from pipeline.motion.averaged import Averaged, Fitted, Phase, Rest, area_of, assembled, wrapped
-from pipeline.motion.fit import Bools, Rows, clipped, covariance_of, fit
+from pipeline.motion.averaged import Averaged, area_of, assembled
+from pipeline.motion.fit import Rows, clipped, covariance_of, fit
+from pipeline.motion.fitted import Fitted, Phase, Rest, wrapped
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import Fit
 from pipeline.numerics.levels import BARE_MENTION, ROUNDS, STRONG
 from pipeline.numerics.regression import DEGREE, solve_weighted
-from pipeline.samples.condition import Conditioned
-from pipeline.track import F8, UNUSABLE, Quality
-from pipeline.windows.demodulate import Demodulated, model_error, with_prior
+from pipeline.samples.condition import Samples
+from pipeline.track import F8, UNUSABLE, Bools, Quality
+from pipeline.windows.demodulate import Windows, model_error, with_prior
 
 FEW_WINDOWS = 4  # minimum number of windows whose amplitudes can select a law; with fewer the samples do
 
@@ -34,13 +35,13 @@ class _OfLaw:
     dof: float
 
 
-def fit_samples(fitted: Fitted, samples: Conditioned) -> Fitted:
+def fit_samples(fitted: Fitted, samples: Samples) -> Fitted:
     """Fit rest position, damping law and phase to all samples together.
 
-    ``samples`` include the disturbances. Their columns are projected out, so that the record without them gives the
+    ``samples`` include the other modes. Their columns are projected out, so that the record without them gives the
     same fit. A drifting rest position follows a polynomial.
     """
-    windows, damping, phase = fitted.demodulated, fitted.damping, fitted.phase
+    windows, damping, phase = fitted.windows, fitted.damping, fitted.phase
     few = windows.t.size < FEW_WINDOWS and not damping.by_statement
     laws, thetas = _short(windows, damping) if few else _considered(damping)
     first, *others = laws
@@ -48,20 +49,29 @@ def fit_samples(fitted: Fitted, samples: Conditioned) -> Fitted:
     rows = _rows(fitted, samples, level)
     # The lag is that of the windows' law; a law that is tried in its place has its own, which is constant.
     lags = {name: None if few and name in ("none", "linear") else phase.lag for name in laws}
-    free = fitted.disturbances.conditioned
+    free = fitted.modes.samples
     last, reach = float(np.max(free.track.t[free.used])), float(np.max(np.abs(rows.t - phase.middle)))
     degree = min(DEGREE, windows.t.size // 4 - 1) if fitted.rest.drifts else 0
-    model = Averaged(laws[first], phase.t0, last, phase.middle, reach, degree, phase.area, lags[first])
+    model = Averaged(
+        law=laws[first],
+        t0=phase.t0,
+        last=last,
+        middle=phase.middle,
+        reach=reach,
+        degree=degree,
+        area=phase.area,
+        lag=lags[first],
+    )
     rest = np.zeros(model.degree + 1)
     if model.degree:
         rest = np.asarray(np.linalg.lstsq(model.rest(windows.t), fitted.rest.curve - level, rcond=None)[0])
     start = np.concatenate([thetas[first], phase.coefficients, rest])
-    least_m = float(np.median(model_error(windows.amplitude, windows.decay, windows.angular_frequency)))
+    least = float(np.median(model_error(windows.amplitude, windows.decay, windows.angular_frequency)))
     for _ in range(1 if model.area is None else 2):
         if model.area is not None:  # until the last round the backbone's column belongs to other amplitudes
             model = replace(model, area=area_of(model.law, model.split(start)[0], model.t0, model.middle, model.last))
         # Few periods cannot tell false echoes from a motion that the model does not describe; the windows' stand.
-        scale = {"least_m": least_m, "noise_m": windows.noise_m}
+        scale = {"least": least, "noise": windows.noise}
         found, rows = clipped(model, rows, start, **scale, rounds=1 if few else ROUNDS)
         start = found.values
     if not found.converged:
@@ -79,7 +89,7 @@ def fit_samples(fitted: Fitted, samples: Conditioned) -> Fitted:
     flags = rows.marked(free.flags, free.used, rows.y - rows.left(best.model, best.fit.values))
     return assembled(
         replace(windows, flags=flags),
-        fitted.disturbances,
+        fitted.modes,
         damping,
         _phase(phase, windows, best),
         _rest(fitted.rest, best, level),
@@ -94,7 +104,7 @@ def _considered(damping: Damping) -> tuple[dict[str, Law], dict[str, F8]]:
     return {n: x.law for n, x in fits.items()}, {n: x.joint.values for n, x in fits.items()}
 
 
-def _short(windows: Demodulated, damping: Damping) -> tuple[dict[str, Law], dict[str, F8]]:
+def _short(windows: Windows, damping: Damping) -> tuple[dict[str, Law], dict[str, F8]]:
     """Return linear drag and no damping, which are all that a record of few periods can distinguish.
 
     A stated built-in law is fitted as well, and the laws that fit the windows if linear drag contradicts these.
@@ -111,9 +121,9 @@ def _short(windows: Demodulated, damping: Damping) -> tuple[dict[str, Law], dict
     return {name: LAWS[name] for name in thetas}, thetas
 
 
-def _rows(fitted: Fitted, samples: Conditioned, level: float) -> Rows:
+def _rows(fitted: Fitted, samples: Samples, level: float) -> Rows:
     """Return the samples about a level, of which those in clusters of false echoes may not return."""
-    free, flags = fitted.disturbances.conditioned, fitted.demodulated.flags
+    free, flags = fitted.modes.samples, fitted.windows.flags
     track = free.track
     known = np.isfinite(track.y) & np.isfinite(track.t)
     usable = (free.flags & UNUSABLE) == 0
@@ -125,13 +135,13 @@ def _rows(fitted: Fitted, samples: Conditioned, level: float) -> Rows:
     candidates = (usable | (echo & ~others)) & ~cluster
     t = np.where(np.isfinite(track.t), track.t, fitted.phase.middle)
     y = np.where(known, track.y, level) - level
-    columns = fitted.disturbances.columns(samples.track.t)
+    columns = None if fitted.modes.subtracted is None else fitted.modes.columns(samples.track.t)
 
     def near_plateau(position: F8) -> Bools:
-        return free.near_plateau(level + position, fitted.demodulated.noise_m)
+        return free.near_plateau(level + position, fitted.windows.noise)
 
     used = usable & ((flags & UNUSABLE) == 0)
-    return Rows(t, y, candidates, used, 1.0, columns if columns.size else None, near_plateau)
+    return Rows(t=t, y=y, candidates=candidates, used=used, u=1.0, columns=columns, near_plateau=near_plateau)
 
 
 def _described(model: Averaged, found: Fit, rows: Rows, windows: int, stated: float | None) -> _OfLaw:
@@ -170,7 +180,7 @@ def _selected(damping: Damping, fits: Mapping[str, _OfLaw]) -> Damping:
     return replace(damping, fits=found, selected=selected, admissible=admissible, unfitted=unfitted)
 
 
-def _phase(phase: Phase, windows: Demodulated, best: _OfLaw) -> Phase:
+def _phase(phase: Phase, windows: Windows, best: _OfLaw) -> Phase:
     """Return the phase with the values of the fit to the samples; its frequency is again the record's mean."""
     model = best.model
     _, turning, _ = model.split(best.fit.values)
@@ -198,6 +208,6 @@ def _rest(rest: Rest, best: _OfLaw, level: float) -> Rest:
     _, _, still = best.model.split(best.fit.values)
     curve = level + best.model.rest(rest.t) @ still
     if best.model.degree:
-        return replace(rest, curve=curve, drift_m=float(np.ptp(curve)))
+        return replace(rest, curve=curve, drift=float(np.ptp(curve)))
     mean = Estimate(float(curve[0]), math.sqrt(best.covariance[-1, -1]), rest.mean.unit)
     return replace(rest, mean=mean, curve=curve)

@@ -19,22 +19,22 @@ import numpy as np
 from pipeline.damping.law_fit import NEGATIVE, least_chi2, mean_squared_rate, weigh
 from pipeline.damping.laws.drag import COEFFICIENTS, DRAGS, Drag
 from pipeline.damping.select import Damping, select_law
-from pipeline.dynamics import Equation, Problem, Trajectory
-from pipeline.dynamics.equation import Real
+from pipeline.dynamics.equation import Equation, Problem, Real
+from pipeline.dynamics.integrator import Trajectory
 from pipeline.dynamics.strang import STRANG
-from pipeline.motion.averaged import Fitted, Phase, Rest, Waveform, wrapped
+from pipeline.modes.mode import Modes
 from pipeline.motion.fit import Rows, clipped, fit
-from pipeline.motion.overdamped import LEAST_DAMPING
+from pipeline.motion.fitted import Fitted, Phase, Rest, Waveform, wrapped
+from pipeline.motion.relaxation import LEAST_DAMPING
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import CENTRAL_STEP, Fit, central_differences
 from pipeline.numerics.levels import MISFIT, NOTICEABLE
-from pipeline.numerics.quantity import amount
 from pipeline.numerics.regression import correlation_length
-from pipeline.samples.condition import Conditioned
-from pipeline.samples.stopping import stop_row
+from pipeline.parts.stopping import stop_row
+from pipeline.samples.condition import Samples
 from pipeline.track import F8, UNUSABLE
-from pipeline.windows.demodulate import Demodulated
-from pipeline.windows.disturbances import Disturbances
+from pipeline.units import amount
+from pipeline.windows.demodulate import Windows
 
 STATE = ("rest", "displacement", "velocity", "angular_frequency")
 # Time step in radians: interpolation errs by 1e-7 of the amplitude, and splitting under weak drag by 1e-6, as measured
@@ -88,7 +88,7 @@ class FreeMotion:
 
     seconds: float  # the motion is solved up to this time
     omega: float  # approximate angular frequency, from which the integrator's step follows
-    amplitude_m: float  # approximate first amplitude, from which the step of difference quotients follows
+    amplitude: float  # approximate first amplitude, from which the step of difference quotients follows
     _kept: dict[bytes, Trajectory] = field(default_factory=dict)
 
     def position(self, t: F8, theta: F8) -> F8:
@@ -125,8 +125,8 @@ class FreeMotion:
 
     def _slopes(self, t: F8, theta: F8, slots: list[int]) -> F8:
         """Return the derivatives (n, p) if no coefficient is negative."""
-        path, amplitude_m, rate = self.trajectory(theta), self.amplitude_m, 0.01 * self.omega
-        scale = dict(zip(range(len(STATE), theta.size), (rate * amplitude_m, rate, rate / amplitude_m), strict=True))
+        path, amplitude, rate = self.trajectory(theta), self.amplitude, 0.01 * self.omega
+        scale = dict(zip(range(len(STATE), theta.size), (rate * amplitude, rate, rate / amplitude), strict=True))
         y, speed = path.at(t), self._velocity(path, t)
         columns: dict[int, F8] = {}
         sized, timed = y.copy(), t * speed
@@ -200,10 +200,10 @@ class Solved:
 
 # Maximum number of periods for the fit of a weakly damped motion that stops within the record; measured: 160 periods,
 # 12,000 samples, take 1.7 s.
-MOST_PERIODS = 250
+LONGEST_SOLVED = 250
 
 
-def fit_equation(samples: Conditioned, windows: Demodulated, damping: Damping, *, stopped: bool) -> Fitted | str | None:
+def fit_equation(samples: Samples, windows: Windows, damping: Damping, *, stopped: bool) -> Fitted | str | None:
     """Fit the equation of motion if the damping requires it; return the reason if that fails.
 
     The result is None if damping is weak, if no law with damping can be fitted, or if linear drag or no damping is
@@ -220,26 +220,26 @@ def fit_equation(samples: Conditioned, windows: Demodulated, damping: Damping, *
     if not laws or not _required(damping, windows, ratio, stopped=stopped):
         return None
     periods = windows.angular_frequency / (2.0 * math.pi) * float(np.ptp(windows.t))
-    if ratio <= NOTICEABLE and periods > MOST_PERIODS:
+    if ratio <= NOTICEABLE and periods > LONGEST_SOLVED:
         return (
             f"the bob stops within the record, but over {periods:.0f} periods the equation of motion takes too long to "
-            f"solve (at most {MOST_PERIODS}), so it is open whether friction stopped it: the averaged law stands"
+            f"solve (at most {LONGEST_SOLVED}), so it is open whether friction stopped it: the averaged law stands"
         )
     words = f"the damping ratio is {ratio:.2g} at the start, where laws of the amplitude err"
-    rows, size_m = _rows(samples, windows, damping), abs(float(damping.best.joint.values[0]))
-    motion, expected_m = FreeMotion(float(np.max(rows.t)), windows.angular_frequency, size_m), rows.u
+    rows, size = _rows(samples, windows, damping), abs(float(damping.best.joint.values[0]))
+    motion, expected = FreeMotion(float(np.max(rows.t)), windows.angular_frequency, size), rows.u
     models = [Solved(law, motion) for law in laws]
     start = _first_solution(models, rows, windows, damping)
-    found, rows = clipped(models[-1], rows, start, least_m=expected_m, rounds=3)
+    found, rows = clipped(models[-1], rows, start, least=expected, rounds=3)
     left, count = rows.left(models[-1], found.values)[rows.used], models[-1].full(found.values).size
-    noise_m = math.sqrt(float(left @ left) / (left.size - count)) if left.size > count else math.inf
-    if not noise_m <= MISFIT * expected_m:
+    noise = math.sqrt(float(left @ left) / (left.size - count)) if left.size > count else math.inf
+    if not noise <= MISFIT * expected:
         return (
             f"{words}, and the equation of motion with {laws[-1].words} leaves more than the noise of the samples, "
-            f"{amount(expected_m, unit)}: the averaged law stands"
+            f"{amount(expected, unit)}: the averaged law stands"
         )
-    noise_m = max(noise_m, 0.01 * expected_m)
-    correlation, rows = correlation_length(left), replace(rows, u=noise_m)
+    noise = max(noise, 0.01 * expected)
+    correlation, rows = correlation_length(left), replace(rows, u=noise)
     chosen = _chosen(models, rows, found.values, correlation, damping, unit)
     if chosen is None:
         return f"{words}, and no fit of the equation of motion converged"
@@ -261,7 +261,7 @@ def _fittable(damping: Damping) -> list[Drag]:
     return sorted(wanted, key=lambda law: len(law.powers))
 
 
-def _required(damping: Damping, windows: Demodulated, ratio: float, *, stopped: bool) -> bool:
+def _required(damping: Damping, windows: Windows, ratio: float, *, stopped: bool) -> bool:
     if stopped or ratio > LEAST_DAMPING:
         return True
     best = damping.best.law
@@ -271,7 +271,7 @@ def _required(damping: Damping, windows: Demodulated, ratio: float, *, stopped: 
     return ratio > NOTICEABLE or bool(last[0] <= 0.0)
 
 
-def _rows(samples: Conditioned, windows: Demodulated, damping: Damping) -> Rows:
+def _rows(samples: Samples, windows: Windows, damping: Damping) -> Rows:
     """Return the samples of the moving bob, with times since the first of them.
 
     Samples at rest show only noise, and many of them would hide a misfit of the moving samples.
@@ -280,14 +280,22 @@ def _rows(samples: Conditioned, windows: Demodulated, damping: Damping) -> Rows:
     within = used & (np.arange(track.t.size) < (track.t.size if stop is None else stop))
     last, first = float(np.max(track.t[used])), damping.t0
     t = np.clip(np.where(np.isfinite(track.t), track.t, first), first, last) - first
-    quantum = (samples.quantum_m or 0.0) / math.sqrt(12.0)
-    expected_m = max(samples.noise_m, quantum, 1e-9 * abs(float(damping.best.joint.values[0])))
+    quantum = (samples.quantum or 0.0) / math.sqrt(12.0)
+    expected = max(samples.noise, quantum, 1e-9 * abs(float(damping.best.joint.values[0])))
     # False echoes of the windows that the solution explains return later.
     used_first = within & ((windows.flags & UNUSABLE) == 0)
-    return Rows(t, track.y, within, used_first, expected_m, None, partial(samples.near_plateau, noise_m=expected_m))
+    return Rows(
+        t=t,
+        y=track.y,
+        candidates=within,
+        used=used_first,
+        u=expected,
+        columns=None,
+        near_plateau=partial(samples.near_plateau, noise=expected),
+    )
 
 
-def _first_solution(models: Sequence[Solved], rows: Rows, windows: Demodulated, damping: Damping) -> F8:
+def _first_solution(models: Sequence[Solved], rows: Rows, windows: Windows, damping: Damping) -> F8:
     """Return the solution of the law with most parameters: the first acceptable one, or else the best.
 
     If friction ends the motion, chi-square has a separate minimum for each whole number of swings. A solution that
@@ -319,7 +327,7 @@ def _nearest(model: Solved, rows: Rows, starts: Iterator[F8]) -> F8:
     return min(starts, key=cost)
 
 
-def _by_amplitude(models: Sequence[Solved], windows: Demodulated, damping: Damping) -> Iterator[F8]:
+def _by_amplitude(models: Sequence[Solved], windows: Windows, damping: Damping) -> Iterator[F8]:
     """Yield start values without damping and with the coefficients of the amplitude laws."""
     omega, first = windows.angular_frequency, damping.best.joint.values[0]
     angle = float(windows.phase[0]) - omega * (float(windows.t[0]) - damping.t0)
@@ -374,7 +382,15 @@ def _chosen(
     weighed = {n: weigh(laws[n], minima[n], least[n], points, correlation, unit) for n in fits}
     selected, admissible = select_law(weighed, damping.stated, float(np.max(rows.t)))
     scatter = replace(damping.scatter, correlation=correlation)
-    every = Damping(damping.t0, weighed, selected, admissible, scatter, unfitted, damping.stated)
+    every = Damping(
+        t0=damping.t0,
+        fits=weighed,
+        selected=selected,
+        admissible=admissible,
+        scatter=scatter,
+        unfitted=unfitted,
+        stated=damping.stated,
+    )
     own = fits[selected]
     return every, by_name[selected], replace(own, covariance=own.covariance * correlation)
 
@@ -396,7 +412,7 @@ def _by_envelope(model: Solved, own: Fit) -> Fit:
 
 
 def _described(
-    samples: Conditioned, windows: Demodulated, damping: Damping, model: Solved, rows: Rows, own: Fit
+    samples: Samples, windows: Windows, damping: Damping, model: Solved, rows: Rows, own: Fit
 ) -> Fitted | str:
     """Return the oscillation by the solution, or what was fitted if no oscillation is left.
 
@@ -407,14 +423,14 @@ def _described(
     still, y, v, natural = theta[: len(STATE)].tolist()
     position = model.motion.position(rows.t, theta)
     residual = samples.track.y - position
-    rms_m = math.sqrt(float(np.mean(residual[rows.used] ** 2)))
+    rms = math.sqrt(float(np.mean(residual[rows.used] ** 2)))
     flags = rows.marked(samples.flags, rows.candidates, position)
     stops = best.amplitude(np.array([np.max(rows.t)]))[0] <= 0.0
     why = (
         f"the damping ratio is {best.rate_at_start() / natural:.2g} at the first sample"
         + (" and friction ends the motion within the record" if stops else "")
         + f": the equation of motion with {model.law.words} was fitted to the samples; it leaves "
-        + amount(rms_m, unit)
+        + amount(rms, unit)
     )
     t, t0, u = windows.t, damping.t0, np.sqrt(np.diag(own.covariance))
     squared_rate = mean_squared_rate(best, best.amplitude(t - t0), np.ones(t.size))
@@ -429,21 +445,30 @@ def _described(
     turns = round((float(windows.phase[0]) - start - omega * float(t[0] - t0)) / (2.0 * math.pi))
     centre = start + 2.0 * math.pi * turns + omega * (middle - t0)
     phase = Phase(
-        t0,
-        Estimate(omega, float(u[3]) * natural / omega, "rad/s"),
-        Estimate(wrapped(start), u_phase, "rad"),
-        None,
-        best.reduced_chi2,
-        damping.scatter.correlation,
-        windows.phase - centre - omega * (t - middle),
-        np.array([centre, omega]),
-        middle,
+        t0=t0,
+        angular_frequency=Estimate(omega, float(u[3]) * natural / omega, "rad/s"),
+        phase=Estimate(wrapped(start), u_phase, "rad"),
+        backbone=None,
+        reduced_chi2=best.reduced_chi2,
+        correlation=damping.scatter.correlation,
+        residual=windows.phase - centre - omega * (t - middle),
+        coefficients=np.array([centre, omega]),
+        middle=middle,
         squared_rate=squared_rate,
     )
     # The residuals of the windows become those of the solution, as sinusoids fail where the bob stops.
-    noise = np.full(windows.noise.shape, rms_m)
-    windows = replace(windows, flags=flags, residual=residual, noise=noise)
+    noises = np.full(windows.noises.shape, rms)
+    windows = replace(windows, flags=flags, residual=residual, noises=noises)
     # The rest position is the constant one of the record; the place where friction holds the bob may differ.
     rest = Rest(Estimate(still, float(u[0]), unit), 0.0, False, t, np.full(t.size, still))
-    waveform = Waveform(position, partial(np.asarray, model.motion.velocity(rows.t, theta)), residual, rms_m)
-    return Fitted(windows, Disturbances.nothing(samples), damping, phase, rest, waveform, "equation", why)
+    waveform = Waveform(position, partial(np.asarray, model.motion.velocity(rows.t, theta)), residual, rms)
+    return Fitted(
+        windows=windows,
+        modes=Modes(samples),
+        damping=damping,
+        phase=phase,
+        rest=rest,
+        waveform=waveform,
+        method="equation",
+        why=why,
+    )

@@ -13,21 +13,18 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.numerics import least_squares
 from pipeline.numerics.least_squares import EPS, Fit
 from pipeline.numerics.levels import FEWEST_FOR_CURVE, MISFIT, ROUNDS
 from pipeline.numerics.regression import correlation_length
 from pipeline.numerics.robust import mad_sigma
-from pipeline.track import F8, U8, Quality
+from pipeline.track import F8, U8, Bools, Quality
 from pipeline.windows.demodulate import CLIP_SIGMAS
-
-Bools = NDArray[np.bool_]
 
 # Maximum share of the samples that may still enter or leave the fit in the last round. At the limit of 4 sigmas, and
 # with signs by chance, they move an estimate by 4 sqrt(1e-4) = 0.04 of its standard uncertainty.
-STEADY = 1e-4
+FEW_CHANGES = 1e-4
 
 
 class Model(Protocol):
@@ -109,7 +106,7 @@ def fit(model: Model, rows: Rows, start: F8) -> Fit:
 
 
 def clipped(
-    model: Model, rows: Rows, start: F8, *, least_m: float, noise_m: float = math.inf, rounds: int = ROUNDS
+    model: Model, rows: Rows, start: F8, *, least: float, noise: float = math.inf, rounds: int = ROUNDS
 ) -> tuple[Fit, Rows]:
     """Fit until the set of false echoes is stable; return the last fit and its rows.
 
@@ -122,12 +119,12 @@ def clipped(
         left = rows.left(model, found.values)
         spread = mad_sigma(left[rows.candidates])
         candidates = rows.candidates & ~rows.on_plateau(rows.y - left)
-        near = rows.used if spread > MISFIT * noise_m else np.abs(left) <= CLIP_SIGMAS * max(spread, least_m)
+        near = rows.used if spread > MISFIT * noise else np.abs(left) <= CLIP_SIGMAS * max(spread, least)
         chosen = candidates & near
         if (count := int(np.count_nonzero(chosen))) < 2 * start.size:
             few = replace(found, converged=False, tried=f"only {count} samples lie on the model")
             return few, replace(rows, used=chosen)
-        if left_rounds == 1 or np.count_nonzero(chosen != rows.used) <= STEADY * chosen.size:
+        if left_rounds == 1 or np.count_nonzero(chosen != rows.used) <= FEW_CHANGES * chosen.size:
             break
         rows, start = replace(rows, used=chosen), found.values
     return found, rows

@@ -12,12 +12,12 @@ from pipeline.bench.instrument import U_CRYSTAL
 from pipeline.motion.fit import Rows, fit
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.levels import FEWEST_FOR_CURVE, NEGLIGIBLE
-from pipeline.numerics.quantity import amount
 from pipeline.numerics.regression import correlation_length
-from pipeline.samples.condition import Conditioned
+from pipeline.samples.condition import Samples
 from pipeline.track import F8
+from pipeline.units import amount
 
-ROUNDING = 64.0 * float(np.finfo(np.float64).eps)  # relative scatter of a motionless record by IEEE rounding
+MOTIONLESS = 64.0 * float(np.finfo(np.float64).eps)  # relative scatter of a motionless record by IEEE rounding
 # Minimum ratio of the weaker mode's amplitude to the stronger one's; below it only one oscillation counts.
 WEAKER = 1.0 / 3.0
 # Minimum numbers of beats and of periods of the slower mode in the record; with fewer, two modes cannot be
@@ -35,7 +35,7 @@ class TwoModes:
 
 
 @dataclass(frozen=True, slots=True)
-class Modes:
+class DecayingModes:
     """The model of some decaying modes: rest position, then a, b, omega and g of each."""
 
     def at(self, t: F8, values: F8) -> tuple[F8, Callable[[], F8]]:
@@ -50,29 +50,29 @@ class Modes:
         return total, lambda: np.stack(slopes, axis=1)
 
 
-def find_two_modes(conditioned: Conditioned) -> TwoModes | None:
+def find_two_modes(samples: Samples) -> TwoModes | None:
     """Return the two modes that a record consists of; None if two modes do not describe it.
 
     :math:`o + \\sum_i e^{-g_i t}(a_i\\cos\\omega_i t + b_i\\sin\\omega_i t)` is fitted to all samples used, started
     from the strongest line of the spectrum and the strongest line of the residual of the first. Covariances are scaled
     by the residuals, including their correlation.
     """
-    used = conditioned.used & np.isfinite(conditioned.track.t)
-    t, y, unit = conditioned.track.t[used], conditioned.track.y[used], conditioned.track.unit
+    used = samples.used & np.isfinite(samples.track.t)
+    t, y, unit = samples.track.t[used], samples.track.y[used], samples.track.unit
     tau, span = t - t[0], float(t[-1] - t[0])
     scale = float(np.std(y))
     if (
         y.size < 4 * FEWEST_FOR_CURVE
-        or scale <= ROUNDING * float(np.max(np.abs(y)))
+        or scale <= MOTIONLESS * float(np.max(np.abs(y)))
         or not 0.0 < span < MOST * float(np.median(np.diff(t)))
     ):
         return None
     values = (y - y.mean()) / scale
     first = _strongest(tau, values)
-    second = _strongest(tau, values - Modes().at(tau, _linear(tau, values, (first,)))[0])
+    second = _strongest(tau, values - DecayingModes().at(tau, _linear(tau, values, (first,)))[0])
     start = _linear(tau, values, (first, second))
     every = np.ones(y.size, np.bool_)
-    found = fit(Modes(), Rows(tau, values, every, every), start)
+    found = fit(DecayingModes(), Rows(tau, values, every, every), start)
     if not np.all(np.isfinite(found.covariance)) or not float(found.residual @ found.residual) < NEGLIGIBLE * y.size:
         return None
     places = sorted((1, 5), key=lambda i: -float(np.hypot(*found.values[i : i + 2])))
@@ -90,7 +90,7 @@ def find_two_modes(conditioned: Conditioned) -> TwoModes | None:
     results = {}
     for name, i, omega, size in zip(("first", "second"), places, omegas, sizes, strict=True):
         period = 2.0 * math.pi / omega
-        relative = math.hypot(float(u[i + 2]) / omega, U_CRYSTAL, conditioned.track.u_rate)
+        relative = math.hypot(float(u[i + 2]) / omega, U_CRYSTAL, samples.track.u_rate)
         results[f"{name}_mode_period"] = Estimate(period, period * relative, "s")
         results[f"{name}_mode_amplitude"] = Estimate(scale * size, scale * float(np.max(u[i : i + 2])), unit)
     descriptions = [

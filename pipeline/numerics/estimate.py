@@ -11,8 +11,8 @@ import numpy as np
 from uncertainties import UFloat, nominal_value, ufloat, umath
 
 from pipeline.numerics.levels import LIMIT
-from pipeline.numerics.quantity import power_of, product_of
 from pipeline.track import F8
+from pipeline.units import power_of, product_of
 
 EXPONENT_ROUNDING = 1e-13
 """Share of a value; a smaller u is left by correlations that cancel, as in period times frequency."""
@@ -96,7 +96,8 @@ class Estimate(UFloat):  # type: ignore[misc]
     def __eq__(self, other: object) -> bool:
         if isinstance(other, Estimate):
             return (self.value, self.u, self.unit) == (other.value, other.u, other.unit)
-        return bool(super().__eq__(other))
+        equal = super().__eq__(other)
+        return equal is not NotImplemented and bool(equal)  # None, for example, is no number
 
     def __bool__(self) -> bool:
         return True  # an estimate is there, also if it is 0: `scene.air_temperature_c or TYPICAL_TEMPERATURE`

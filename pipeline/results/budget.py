@@ -17,7 +17,7 @@ from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.levels import coverage_factor
 
-Kind = Literal["A", "B"]
+Evaluation = Literal["A", "B"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,7 @@ class Contribution:
     """One line of a budget."""
 
     name: str  # name of the input
-    kind: Kind  # "A" for scatter of the record, which a longer record reduces by averaging; "B" for other sources
+    kind: Evaluation  # "A" for scatter of the record, which a longer record reduces by averaging; "B" for other sources
     input: Estimate | None  # value and standard uncertainty of the input; None for a group of correlated parameters
     sensitivity: float | None  # derivative of the result by the input; None for a group
     u: float  # contribution of the input to the standard uncertainty of the result, in the result's unit
@@ -42,7 +42,7 @@ class Budget:
     # Contributions in descending order of their shares; empty for an exact result.
     contributions: tuple[Contribution, ...]
 
-    def u_of(self, kind: Kind) -> float:
+    def u_of(self, kind: Evaluation) -> float:
         """Return the part of the standard uncertainty from inputs of one kind, in the result's unit."""
         return math.hypot(*(c.u for c in self.contributions if c.kind == kind))
 
@@ -79,11 +79,11 @@ class Inputs:
     """
 
     def __init__(self) -> None:
-        self._kinds: dict[str, Kind] = {}
+        self._kinds: dict[str, Evaluation] = {}
         self._dofs: dict[str, float] = {}
         self._single: dict[str, Estimate] = {}
 
-    def add(self, name: str, estimate: Estimate, kind: Kind, dof: float = math.inf) -> Any:
+    def add(self, name: str, estimate: Estimate, kind: Evaluation, dof: float = math.inf) -> Any:
         """Return an input as a variable, or as a plain number if it is exact."""
         from uncertainties import ufloat
 
@@ -95,14 +95,14 @@ class Inputs:
         self._single[name] = estimate
         return ufloat(estimate.value, estimate.u, name) if estimate.u > 0 else estimate.value
 
-    def add_joint(self, name: str, joint: Joint, kind: Kind, dof: float = math.inf) -> list[Any]:
+    def add_joint(self, name: str, joint: Joint, kind: Evaluation, dof: float = math.inf) -> list[Any]:
         """Return jointly estimated parameters as correlated variables, which are one line in every budget."""
         from uncertainties import correlated_values
 
         self._register(name, kind, dof)
         return list(correlated_values(joint.values.tolist(), joint.covariance, [name] * joint.values.size))
 
-    def add_alternatives(self, name: str, weights: Mapping[str, float], kind: Kind) -> dict[str, Any]:
+    def add_alternatives(self, name: str, weights: Mapping[str, float], kind: Evaluation) -> dict[str, Any]:
         """Return a variable z_i of mean 0 and variance w_i for each alternative; they are one line in every budget.
 
         If a result x would be x_i under the alternative i, it is written as x + sum_i (x_i - x) z_i. Its variance then
@@ -134,10 +134,20 @@ class Inputs:
                 given = self._single.get(name)
                 slope = None if given is None else slopes[name]
                 u, share = math.sqrt(variance), variance / whole
-                lines.append(Contribution(name, self._kinds[name], given, slope, u, share, self._dofs[name]))
+                lines.append(
+                    Contribution(
+                        name=name,
+                        kind=self._kinds[name],
+                        input=given,
+                        sensitivity=slope,
+                        u=u,
+                        share=share,
+                        dof=self._dofs[name],
+                    )
+                )
         return Budget(quantity, Estimate.of_variable(x, unit, math.sqrt(whole)), tuple(lines))
 
-    def _register(self, name: str, kind: Kind, dof: float = math.inf) -> None:
+    def _register(self, name: str, kind: Evaluation, dof: float = math.inf) -> None:
         if name in self._kinds:
             raise ValueError(f"an input {name!r} is there already")
         self._kinds[name], self._dofs[name] = kind, max(dof, 1.0)

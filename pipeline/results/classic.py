@@ -97,7 +97,15 @@ def classic(track: Track, scene: Scene | None = None) -> Classic:
             estimates["reynolds_number"] = Estimate.of_variable(1.204 / 1.825e-5 * (scene.disc_diameter_m * speed), "")
     lowest, highest = int(np.argmin(y)), int(np.argmax(y))
     extremes = (float(t[lowest]), float(y[lowest])), (float(t[highest]), float(y[highest]))
-    return Classic(estimates, window_t, window_amplitude, t[crests], y[crests], extremes, chi2)
+    return Classic(
+        estimates=estimates,
+        window_t=window_t,
+        window_amplitude=window_amplitude,
+        crests_t=t[crests],
+        crests_y=y[crests],
+        extremes=extremes,
+        chi2=chi2,
+    )
 
 
 def sliding_amplitude(t: F8, y: F8, window_s: float) -> tuple[F8, F8]:

@@ -18,14 +18,14 @@ from pipeline.damping.average import Weighted
 from pipeline.damping.law_fit import LawFit
 from pipeline.damping.laws.drag import COEFFICIENTS
 from pipeline.damping.select import Damping
-from pipeline.motion.averaged import Fitted, Phase
+from pipeline.motion.fitted import Fitted, Phase
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.levels import FEWEST_FOR_LINE, MISFIT
 from pipeline.numerics.regression import solve_weighted
 from pipeline.track import F8, UNUSABLE, Quality, Track
-from pipeline.windows.demodulate import Demodulated
+from pipeline.windows.demodulate import Windows
 
-POINTS = 200  # number of points of a drawn curve
+CURVE_POINTS = 200  # number of points of a drawn curve
 GROUPS = 12  # maximum number of groups of windows whose local slopes are drawn with the curve
 
 
@@ -45,16 +45,14 @@ class Curve:
     u_points: F8
 
 
-def energy_curve(
-    damping: Damping, demodulated: Demodulated, factor: Estimate, laws: Sequence[Weighted], unit: str
-) -> Curve:
+def energy_curve(damping: Damping, windows: Windows, factor: Estimate, laws: Sequence[Weighted], unit: str) -> Curve:
     """Return the mechanical energy :math:`E = \\frac12 m\\omega^2 A^2` against time.
 
     The uncertainty is :math:`u^2(E) = \\sum_i w_i[(2 E_i\\,u(A_i)/A_i)^2 + (E_i - E)^2] + (E\\,u_F/F)^2`, summed over
     ``laws``; E is the energy by the selected law.
     """
-    t = demodulated.t
-    x = np.linspace(damping.t0, float(t[-1]), POINTS)
+    t = windows.t
+    x = np.linspace(damping.t0, float(t[-1]), CURVE_POINTS)
     best = damping.best
     amplitude = best.amplitude(x - damping.t0)
     energy = factor.value * amplitude**2
@@ -63,19 +61,19 @@ def energy_curve(
         other = one.fit.amplitude(x - damping.t0)
         own = 2.0 * factor.value * other * one.fit.u_amplitude(x - damping.t0)
         variance += one.weight * (own**2 + (factor.value * other**2 - energy) ** 2)
-    points = factor.value * demodulated.amplitude**2
+    points = factor.value * windows.amplitude**2
     return Curve(
-        x,
-        energy,
-        np.sqrt(variance),
-        unit,
-        t,
-        points,
-        2.0 * factor.value * np.abs(demodulated.amplitude) * damping.scatter.u,
+        x=x,
+        y=energy,
+        u=np.sqrt(variance),
+        unit=unit,
+        x_points=t,
+        y_points=points,
+        u_points=2.0 * factor.value * np.abs(windows.amplitude) * damping.scatter.u,
     )
 
 
-def drag_curve(damping: Damping, demodulated: Demodulated, factor: Estimate, laws: Sequence[Weighted]) -> Curve | None:
+def drag_curve(damping: Damping, windows: Windows, factor: Estimate, laws: Sequence[Weighted]) -> Curve | None:
     """Return the drag coefficient against amplitude; None if the amplitude does not decrease.
 
     The curve is the coefficient with which purely quadratic drag would dissipate the same energy in one cycle:
@@ -84,13 +82,13 @@ def drag_curve(damping: Damping, demodulated: Demodulated, factor: Estimate, law
     groups of windows.
     """
     best = damping.best
-    elapsed = demodulated.t - damping.t0
+    elapsed = windows.t - damping.t0
     fitted = best.amplitude(elapsed)
     least, most = float(np.min(fitted)), float(np.max(fitted))
     if not (0.0 < least < most):
         return None
     # Amplitudes beyond the record would be extrapolated; a logarithmic spacing shows small amplitudes too.
-    x = np.geomspace(least, most, POINTS)
+    x = np.geomspace(least, most, CURVE_POINTS)
 
     def coefficient(fit: LawFit, theta: F8) -> F8:
         friction = _friction(best, theta if fit.name == best.name else best.joint.values)
@@ -102,17 +100,17 @@ def drag_curve(damping: Damping, demodulated: Demodulated, factor: Estimate, law
         gradient = fit.by_parameters(functools.partial(coefficient, fit))
         own = np.einsum("in,ij,jn->n", gradient, fit.joint.covariance, gradient)
         variance += weight * (np.maximum(own, 0.0) + (coefficient(fit, fit.joint.values) - y) ** 2)
-    return Curve(x, y, np.sqrt(variance), "", *_local_drag(damping, demodulated, factor.value))
+    return Curve(x, y, np.sqrt(variance), "", *_local_drag(damping, windows, factor.value))
 
 
 def _friction(fit: LawFit, theta: F8) -> float:
     return 0.0 if fit.drag_term("mu") is None else float(theta[fit.joint.names.index("mu")])
 
 
-def _local_drag(damping: Damping, demodulated: Demodulated, factor: float) -> tuple[F8, F8, F8]:
+def _local_drag(damping: Damping, windows: Windows, factor: float) -> tuple[F8, F8, F8]:
     """Return amplitude, drag coefficient and its scatter for groups of windows, without assuming a law of drag."""
     kept = damping.scatter.kept
-    t, amplitude, u = demodulated.t[kept], demodulated.amplitude[kept], damping.scatter.u[kept]
+    t, amplitude, u = windows.t[kept], windows.amplitude[kept], damping.scatter.u[kept]
     groups = min(GROUPS, t.size // FEWEST_FOR_LINE)
     rows = []
     for part in np.array_split(np.arange(t.size), groups) if groups else []:
@@ -150,7 +148,7 @@ def kinematics(track: Track, fitted: Fitted, laws: Sequence[Weighted]) -> Smooth
     Where the fit does not describe the record, amplitude and phase are those of the windows. The uncertainties exclude
     those of clock and scale, which are common factors.
     """
-    phase, windows = fitted.phase, fitted.demodulated
+    phase, windows = fitted.phase, fitted.windows
     known = np.isfinite(track.t) & ((windows.flags & Quality.OUTSIDE) == 0)
     used = known & ((windows.flags & UNUSABLE) == 0)
     t = np.where(known, track.t, phase.t0)
@@ -159,7 +157,7 @@ def kinematics(track: Track, fitted: Fitted, laws: Sequence[Weighted]) -> Smooth
     size, u_size = _averaged(laws, elapsed)
     angle, u_angle = phase.total(t), _u_phase(phase, t)
     solved = fitted.method == "equation"
-    if not solved and (best.rejected or fitted.waveform.rms_m > MISFIT * windows.noise_m):
+    if not solved and (best.rejected or fitted.waveform.rms > MISFIT * windows.noise):
         at = windows.t
         expected, _ = _averaged(laws, at - phase.t0)
         size = size + np.interp(t, at, windows.amplitude - expected)

@@ -21,11 +21,11 @@ from pipeline.bench.spring import GRAVITY_M_PER_S2, HEAVIEST_SHARE, oscillating_
 from pipeline.damping.laws.drag import amplitudes
 from pipeline.damping.select import Damping
 from pipeline.dynamics.equation import Problem
-from pipeline.motion.averaged import Fitted, Rest
+from pipeline.modes.mode import Modes
+from pipeline.motion.fitted import Fitted, Rest
 from pipeline.numerics.levels import NEGLIGIBLE
-from pipeline.numerics.quantity import amount
 from pipeline.track import Track
-from pipeline.windows.disturbances import Disturbances
+from pipeline.units import amount
 
 SPEED_OF_SOUND_OF_RECORD = 344.0  # m/s, fixed in MotionSensor.vi
 STEEL_KG_PER_M3 = 7850.0  # EN 1993-1-2 (2005), 3.2.2
@@ -64,8 +64,8 @@ def tabulate(track: Track, fitted: Fitted, scene: Scene) -> tuple[Effect, ...]:
         *_masses(scene, counted),
         _disc_drag(scene, damping, omega.value, unit),
         _backbone(fitted),
-        _rest_drift(fitted.rest, fitted.demodulated.noise_m),
-        *_modes(fitted.disturbances, unit),
+        _rest_drift(fitted.rest, fitted.windows.noise),
+        *_modes(fitted.modes, unit),
         *((_buoyancy(scene, omega.value, 1.0, "m"), _speed_of_sound(scene, instrument)) if unit == "m" else ()),
         _clock_rate(instrument),
     )
@@ -187,34 +187,34 @@ def _backbone(fitted: Fitted) -> Effect:
     return Effect(name, None, shift, "1", True, why)
 
 
-def _rest_drift(rest: Rest, noise_m: float) -> Effect:
+def _rest_drift(rest: Rest, noise: float) -> Effect:
     unit = rest.mean.unit
     if not rest.drifts:
-        why = f"a constant rest position describes the record (noise of one sample {amount(noise_m, unit)})"
-        return Effect("rest_drift", None, rest.drift_m, unit, False, why)
+        why = f"a constant rest position describes the record (noise of one sample {amount(noise, unit)})"
+        return Effect("rest_drift", None, rest.drift, unit, False, why)
     why = "the rest position moves more than its scatter allows; it is followed by a smooth curve"
-    return Effect("rest_drift", None, rest.drift_m, unit, True, why)
+    return Effect("rest_drift", None, rest.drift, unit, True, why)
 
 
-def _modes(disturbances: Disturbances, unit: str) -> Iterator[Effect]:
+def _modes(modes: Modes, unit: str) -> Iterator[Effect]:
     """Yield the effects of modes of other frequencies, and of harmonics of the main oscillation."""
-    found = disturbances.sideways.modes
+    found = modes.members
     own = [mode for mode in found if mode.kind == "mode"]
     locked = [mode for mode in found if mode.kind != "mode"]
     names = (("sideways_mode", own, "mode of another frequency"), ("harmonics", locked, "harmonic"))
     for name, members, what in names:
-        if disturbances.sideways.carrier is None:
+        if modes.carrier is None:
             yield Effect(name, None, None, unit, False, "not sought: too few periods, or not at this accuracy")
         elif not members:
             yield Effect(name, None, None, unit, False, f"no {what} stands out of what the main oscillation leaves")
         else:
-            size = math.sqrt(sum(mode.amplitude_m**2 for mode in members))
-            verdict = "more" if disturbances.modelled else "less"
+            size = math.sqrt(sum(mode.amplitude**2 for mode in members))
+            verdict = "more" if modes.subtracted is not None else "less"
             why = (
                 f"{len(members)} times a {what}, together of this amplitude; the strongest line would leave up to "
-                f"{amount(disturbances.leak_m, unit)} in the main amplitude, {verdict} than a tenth of its uncertainty"
+                f"{amount(modes.leak, unit)} in the main amplitude, {verdict} than a tenth of its uncertainty"
             )
-            yield Effect(name, None, size, unit, disturbances.modelled, why)
+            yield Effect(name, None, size, unit, modes.subtracted is not None, why)
 
 
 def _buoyancy(scene: Scene, omega: float, length_m: float, unit: str) -> Effect:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import AnalysisError
-from pipeline.numerics.levels import normal_quantile
+from pipeline.numerics.levels import FEWEST_FOR_CURVE, FEWEST_FOR_MEDIAN, NEGLIGIBLE, SIGNIFICANT, normal_quantile
 from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8, U8, UNUSABLE, Quality, Track
 
@@ -21,9 +21,9 @@ FOURTH_DIFFERENCE_GAIN = math.sqrt(math.comb(8, 4))
 # the probability is 5e-4.
 CREST_SIGMAS = 3.5
 # Samples over which a local curvature is estimated; the probability on either side of its quantile is known to 3 %.
-BLOCK = 256
-LARGEST = 1e100  # magnitude of a measured value; anything beyond is a missing sample
-ROUNDING = 1e-9  # fraction of the largest value; smaller differences are rounding errors of one value
+CURVATURE_BLOCK = 256
+LARGEST_VALUE = 1e100  # magnitude of a measured value; anything beyond is a missing sample
+ONE_VALUE = 1e-9  # fraction of the largest value; smaller differences are rounding errors of one value
 # Distance of a false echo from the median of the five samples around it, beyond what curvature explains, in standard
 # deviations of the noise.
 SPIKE_SIGMAS = 8.0
@@ -36,12 +36,12 @@ GAP = 5.0
 
 
 @dataclass(frozen=True, slots=True)
-class Cut:
-    """One end of the motion at which a fixed object or a lost target cuts it off, as its sinusoid shows."""
+class Clipping:
+    """One end of the motion at which a fixed object or a lost target clips it, as its sinusoid shows."""
 
     end: Literal["far", "near"]
-    from_m: float  # distance beyond which samples are left out, m
-    level_m: float  # median of the outer half of the distances left out, m
+    beyond: float  # distance beyond which samples are left out, m
+    level: float  # median of the outer half of the distances left out, m
     samples: int  # number of samples left out
     # first_s, last_s: times of the first and the last sample left out, s.
     first_s: float
@@ -49,18 +49,20 @@ class Cut:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Conditioned:
+class Samples:
     """A track in which every sample has been judged."""
 
     track: Track  # the track as it was given
     flags: U8  # (n,) the track's own flags and those found here
     # Standard deviation of the white noise from fourth differences, m; independent of any model of the motion.
-    noise_m: float
-    plateaus_m: tuple[float, ...]  # distances at which the record is clipped
+    noise: float
+    plateaus: tuple[float, ...]  # distances at which the record is clipped
     # Resolution of the distances: the track's, or a coarser one that the distances themselves show.
-    quantum_m: float | None
-    clipped_from_m: tuple[float, ...] = ()  # for each plateau, the distance beyond which samples were flagged
-    cuts: tuple[Cut, ...] = ()  # found by the sinusoid, which replace the plateaus; see pipeline.windows.clipping
+    quantum: float | None
+    clipped_from: tuple[float, ...] = ()  # for each plateau, the distance beyond which samples were flagged
+    clippings: tuple[
+        Clipping, ...
+    ] = ()  # found by the sinusoid, which replace the plateaus; see pipeline.parts.clipping
 
     @property
     def used(self) -> NDArray[np.bool_]:
@@ -68,24 +70,24 @@ class Conditioned:
         mask: NDArray[np.bool_] = (self.flags & UNUSABLE) == 0
         return mask
 
-    def less(self, taken_m: F8) -> Conditioned:
+    def less(self, taken: F8) -> Samples:
         """Return the record with values (n,) subtracted from its distances; flags and times are kept."""
-        return replace(self, track=replace(self.track, y=self.track.y - taken_m))
+        return replace(self, track=replace(self.track, y=self.track.y - taken))
 
-    def near_plateau(self, model_m: F8, noise_m: float) -> NDArray[np.bool_]:
+    def near_plateau(self, model: F8, noise: float) -> NDArray[np.bool_]:
         """Return where a model is so close to a plateau that noise decides whether a sample is clipped.
 
         The model selects the samples to leave out there, not their own noise, so the remaining samples are not biased.
         """
-        near = np.zeros(model_m.shape, np.bool_)
-        middle = float(np.median(model_m)) if self.clipped_from_m else 0.0
-        for bottom in self.clipped_from_m:
+        near = np.zeros(model.shape, np.bool_)
+        middle = float(np.median(model)) if self.clipped_from else 0.0
+        for bottom in self.clipped_from:
             sign = 1.0 if bottom > middle else -1.0
-            near |= sign * model_m > sign * bottom - CREST_SIGMAS * noise_m
+            near |= sign * model > sign * bottom - CREST_SIGMAS * noise
         return near
 
 
-def condition(track: Track) -> Conditioned:
+def condition(track: Track) -> Samples:
     """Flag missing samples, duplicate and backward times, isolated false echoes and clipped plateaus.
 
     Noise is estimated from fourth differences. A motion of amplitude A and angular frequency :math:`\\omega`, sampled
@@ -101,13 +103,13 @@ def condition(track: Track) -> Conditioned:
     (2, 1)
     """
     flags = track.flags.copy()
-    measured = np.abs(track.y) < LARGEST  # and not NaN
+    measured = np.abs(track.y) < LARGEST_VALUE  # and not NaN
     flags[~measured] |= np.uint8(Quality.MISSING)
     # Where the reader has flagged one of two interchanged rows, its decision is kept.
     judged = (flags & np.uint8(Quality.DUPLICATE_TIME | Quality.NON_MONOTONIC_TIME)) != 0
     flags |= _time_flags(np.where(judged, np.nan, track.t), judged)
     clean = (flags & UNUSABLE) == 0
-    if np.count_nonzero(clean) < 8:
+    if np.count_nonzero(clean) < FEWEST_FOR_CURVE:
         flagged = {flag: int(np.count_nonzero(flags & np.uint8(flag))) for flag in Quality if flag & UNUSABLE}
         why = ", ".join(f"{count} {flag.name.lower()}" for flag, count in flagged.items() if count and flag.name)
         raise AnalysisError(
@@ -120,12 +122,12 @@ def condition(track: Track) -> Conditioned:
     spikes = _spikes(y, half_step, SPIKE_SIGMAS, _edges(track.t[clean], track.rate_hz))
     flags[rows[spikes]] |= np.uint8(Quality.FALSE_ECHO)
     y_kept, rows = y[~spikes], rows[~spikes]
-    noise_m = fourth_difference_noise(y_kept)
+    noise = fourth_difference_noise(y_kept)
     plateaus: list[float] = []
     bottoms: list[float] = []
     ordered = np.sort(y_kept)
     found = [
-        (sign, *_plateau(sign * y_kept, increasing, max(noise_m, half_step)))
+        (sign, *_plateau(sign * y_kept, increasing, max(noise, half_step)))
         for sign, increasing in ((1.0, ordered), (-1.0, -ordered[::-1]))
     ]
     # A record that lies mostly on plateaus is a step or a bob at rest, not a clipped motion.
@@ -135,22 +137,22 @@ def condition(track: Track) -> Conditioned:
                 plateaus.append(sign * level)
                 bottoms.append(sign * bottom)
                 flags[rows[members]] |= np.uint8(Quality.CLIPPED)
-    quantum_m = coarsest_step(ordered, track.quantum_m)
-    return Conditioned(track, flags, noise_m, tuple(plateaus), quantum_m, tuple(bottoms))
+    quantum = coarsest_step(ordered, track.quantum_m)
+    return Samples(track, flags, noise, tuple(plateaus), quantum, tuple(bottoms))
 
 
-def coarsest_step(ordered: F8, stated_m: float | None) -> float | None:
+def coarsest_step(ordered: F8, stated: float | None) -> float | None:
     """Return the smallest step between values that repeat; files print more digits than sensors resolve."""
     steps = np.diff(ordered)
-    apart = steps > ROUNDING * max(-float(ordered[0]), float(ordered[-1]), 0.0)
+    apart = steps > ONE_VALUE * max(-float(ordered[0]), float(ordered[-1]), 0.0)
     if not 0 < np.count_nonzero(apart) <= 0.5 * ordered.size:
-        return stated_m
+        return stated
     least = float(steps[apart].min())
     # Values in steps are whole steps apart; those of a computed motion that repeats itself are not.
     near = steps[apart & (steps < 50.0 * least)] / least
-    if np.mean(np.abs(near - np.rint(near)) > 0.1) > 0.1:
-        return stated_m
-    return least if stated_m is None or least > 1.5 * stated_m else stated_m
+    if np.mean(np.abs(near - np.rint(near)) > NEGLIGIBLE) > NEGLIGIBLE:
+        return stated
+    return least if stated is None or least > 1.5 * stated else stated
 
 
 def fourth_difference_noise(y: F8) -> float:
@@ -200,29 +202,29 @@ def _edges(t: F8, rate_hz: float) -> list[int]:
 
 def _spikes(y: F8, half_step: float, sigmas: float, edges: list[int]) -> NDArray[np.bool_]:
     """Return which samples deviate from the median of five around them by more than noise and curvature explain."""
-    if y.size < 8:
+    if y.size < FEWEST_FOR_CURVE:
         return np.zeros(y.size, np.bool_)
     second = np.diff(y, 2)
     rounding = 1e-12 * float(np.abs(y).max())
-    noise_m, flooded = _least_noise(second, rounding)
-    if noise_m <= rounding:  # most samples equal their neighbours: single ones one step off are no spikes
+    noise, flooded = _least_noise(second, rounding)
+    if noise <= rounding:  # most samples equal their neighbours: single ones one step off are no spikes
         half_step = 0.5 * (coarsest_step(np.sort(y), 2.0 * half_step) or 0.0)
     # Effect of curvature alone: a quantile of the second differences that spikes on a fifth of the samples leave
     # unchanged. For a cosine, the 0.15-quantile of the second differences is 0.40 times the 0.4-quantile.
     share, gain = (0.15, 2.5) if flooded else (0.4, 1.0)
     rank = int(share * second.size)
-    least = sigmas * max(noise_m, half_step)
+    least = sigmas * max(noise, half_step)
     spikes = _beyond(y, least + 5.0 * gain * float(np.partition(np.abs(second), rank)[rank]), edges)
     if np.count_nonzero(spikes) > 0.05 * y.size:
         # Where the bob has nearly come to rest, the curvature is less than at the start: take each block by itself.
-        blocks = second[: second.size // BLOCK * BLOCK].reshape(-1, BLOCK)
+        blocks = second[: second.size // CURVATURE_BLOCK * CURVATURE_BLOCK].reshape(-1, CURVATURE_BLOCK)
         if blocks.size and np.count_nonzero(
             local := _beyond(y, least + 5.0 * gain * _curvature(blocks, share, y.size), edges)
         ) < 0.5 * np.count_nonzero(spikes):
             return local
         # So many spikes also come in runs, which a median of five follows; but few of them lie within the motion.
         middle = float(np.median(y[~spikes]))
-        reach = 3.0 * mad_sigma(y[~spikes] - middle)
+        reach = SIGNIFICANT * mad_sigma(y[~spikes] - middle)
         spikes |= np.abs(y - middle) > reach
     return spikes
 
@@ -248,7 +250,7 @@ def _beyond(y: F8, bound: float | F8, edges: list[int]) -> NDArray[np.bool_]:
         worst = found[away[found] >= away[near].max(axis=1)]
         spikes[worst] = True
         kept = np.flatnonzero(~spikes)
-        if kept.size < 8:
+        if kept.size < FEWEST_FOR_CURVE:
             break
         smooth = y.copy()
         smooth[spikes] = np.interp(np.flatnonzero(spikes), kept, y[kept])
@@ -281,7 +283,7 @@ def _median_of_five(a: F8, b: F8, c: F8, d: F8, e: F8) -> F8:
     return np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), e))
 
 
-def _cut_often(y: F8, band: NDArray[np.bool_], low: float) -> bool:
+def _clipped_often(y: F8, band: NDArray[np.bool_], low: float) -> bool:
     """Return whether the motion enters a band from below ``low`` at least twice, for a few samples each time.
 
     A bob that settles there enters once, and a hand that holds it there makes one stay longer than all others together.
@@ -293,7 +295,7 @@ def _cut_often(y: F8, band: NDArray[np.bool_], low: float) -> bool:
     return bool(stays.size >= 2 and stays.max() <= 0.5 * stays.sum())
 
 
-def _plateau(y: F8, ordered: F8, noise_m: float) -> tuple[float, float, NDArray[np.int64]]:
+def _plateau(y: F8, ordered: F8, noise: float) -> tuple[float, float, NDArray[np.int64]]:
     """Find a clipped plateau at the upper end of ``y``; ``ordered`` contains its values in increasing order.
 
     A clipped record has many samples in a band a few sigma wide, with almost none above it and few beneath. For an
@@ -303,12 +305,12 @@ def _plateau(y: F8, ordered: F8, noise_m: float) -> tuple[float, float, NDArray[
     low, high = ordered[0], ordered[-1]
     if (level := _saturated(y, ordered)) is not None:
         return level, level, np.flatnonzero(y >= level)
-    width = 6.0 * noise_m
+    width = 2.0 * SIGNIFICANT * noise
     if high - low < 6.0 * width or width == 0.0:
         return 0.0, 0.0, none
     first = int(np.searchsorted(ordered, low + 0.6 * (high - low)))
     upper = ordered[first:]
-    few = math.ceil(max(0.02 * y.size, 8))
+    few = math.ceil(max(0.02 * y.size, FEWEST_FOR_CURVE))
     # Bands that begin at these indices contain enough samples.
     starts = np.flatnonzero(upper[few - 1 :] <= upper[: max(upper.size - few + 1, 0)] + width)
     if not starts.size:
@@ -319,11 +321,11 @@ def _plateau(y: F8, ordered: F8, noise_m: float) -> tuple[float, float, NDArray[
     bottom = upper[start]
     above = upper.size - start - inside
     beneath = first + start - int(np.searchsorted(ordered, bottom - width))
-    if above > 0.1 * inside or inside < CONTRAST * (beneath + 1):
+    if above > NEGLIGIBLE * inside or inside < CONTRAST * (beneath + 1):
         return 0.0, 0.0, none
     band = (y >= bottom) & (y <= bottom + width)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], band.astype(np.int8), [0]])))
-    if np.median(edges[1::2] - edges[::2]) < 3 or not _cut_often(y, band, bottom - 3.0 * width):
+    if np.median(edges[1::2] - edges[::2]) < FEWEST_FOR_MEDIAN or not _clipped_often(y, band, bottom - 3.0 * width):
         return 0.0, 0.0, none
     # Samples in heavy tails of the noise lie above the band but still belong to the plateau.
     members = np.flatnonzero(y >= bottom)
@@ -332,15 +334,15 @@ def _plateau(y: F8, ordered: F8, noise_m: float) -> tuple[float, float, NDArray[
 
 def _saturated(y: F8, ordered: F8) -> float | None:
     """Return the value at which a sensor clips its noisy signal at the top, or None where it does not."""
-    few = max(int(0.02 * y.size), 8)
+    few = max(int(0.02 * y.size), FEWEST_FOR_CURVE)
     level = float(ordered[-max(few // 2, 1)])
     first, last = np.searchsorted(ordered, level), np.searchsorted(ordered, level, side="right")
     inside = int(last - first)
-    if inside < few or ordered.size - last > 0.1 * inside or first == 0:
+    if inside < few or ordered.size - last > NEGLIGIBLE * inside or first == 0:
         return None
     next_lower = ordered[first - 1]
     beneath = int(first - np.searchsorted(ordered, next_lower))
     margin = 0.05 * (level - float(ordered[0]))
-    if inside < CONTRAST * (beneath + 1) or not _cut_often(y, y >= level, level - margin):
+    if inside < CONTRAST * (beneath + 1) or not _clipped_often(y, y >= level, level - margin):
         return None
     return level

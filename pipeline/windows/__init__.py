@@ -1,5 +1,4 @@
 """Windows: the period, and amplitude, phase and rest position once per period.
 
-The room contains the first estimate of the period from the spectrum, the demodulation in windows and the search for
-second modes. It also finds the part of a recording in which the bob moves freely.
+The room contains the first estimate of the period from the spectrum, the linear fit of all windows and its passes.
 """

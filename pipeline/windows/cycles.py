@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.numerics.levels import IMPROBABLE, NEGLIGIBLE
-from pipeline.numerics.quantity import amount, noun
-from pipeline.samples.condition import GAP, Conditioned
+from pipeline.samples.condition import GAP, Samples
 from pipeline.track import F8
+from pipeline.units import amount, noun
 
 # Periods below which the line's negative-frequency image shifts the spectrum's peak: measured on sines of any phase, by
 # up to 8 % at two periods, 1 % at three and 0.05 % at four.
@@ -44,8 +44,8 @@ class NoOscillation:
     why: str  # reason, in one sentence
 
 
-def find_cycles(conditioned: Conditioned) -> Cycles | NoOscillation:
-    """Find the oscillation's frequency and cut the record into windows of one period or, with noise, several.
+def find_cycles(samples: Samples) -> Cycles | NoOscillation:
+    """Find the oscillation's frequency and slice the record into windows of one period or, with noise, several.
 
     The latter states the reason: nothing moves, no peak exceeds the noise, or the record spans under 1.5 periods.
 
@@ -62,11 +62,11 @@ def find_cycles(conditioned: Conditioned) -> Cycles | NoOscillation:
     .. [1] M. Gasior, J. L. Gonzalez, "Improving FFT frequency measurement resolution by parabolic and Gaussian
        spectrum interpolation", AIP Conf. Proc. 732 (2004) 276, doi:10.1063/1.1831158.
     """
-    track, used = conditioned.track, conditioned.used
+    track, used = samples.track, samples.used
     t, y = track.t[used], track.y[used]
     low, high = float(y.min()), float(y.max())
     spread = high - low
-    resolution = conditioned.quantum_m or 0.0
+    resolution = samples.quantum or 0.0
     if spread <= max(3.0 * resolution, 1e-12 * max(high, -low)):
         return NoOscillation(
             f"the {noun(track.unit)} stays within {amount(spread, track.unit, '.3g')}: nothing moves in the beam"
@@ -74,14 +74,14 @@ def find_cycles(conditioned: Conditioned) -> Cycles | NoOscillation:
     line = _spectral_line(t, y, track.t, track.rate_hz)
     if isinstance(line, NoOscillation):
         return line
-    frequency_hz, amplitude_m = line
+    frequency_hz, amplitude = line
     duration_s = float(t[-1] - t[0]) + 1.0 / track.rate_hz
     if duration_s * frequency_hz < FEW_PERIODS:
         frequency_hz = _least_left(t, y, frequency_hz)
     count = duration_s * frequency_hz
     if count < 1.5:
         return NoOscillation(f"the recording spans only {count:.2g} periods, and at least 1.5 are needed")
-    needed = max(SAMPLES_PER_WINDOW, 2.0 * (conditioned.noise_m / (U_PHASE * max(amplitude_m, 1e-300))) ** 2)
+    needed = max(SAMPLES_PER_WINDOW, 2.0 * (samples.noise / (U_PHASE * max(amplitude, 1e-300))) ** 2)
     periods = max(1, math.ceil(needed * frequency_hz / track.rate_hz), math.ceil(count / MOST_WINDOWS))
     periods = min(periods, max(1, int(count)))
     return Cycles(frequency_hz, count, _bounds(track.t, used, frequency_hz, track.rate_hz, periods), periods)

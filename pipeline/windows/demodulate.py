@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from pipeline.errors import AnalysisError
 from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_LINE, NOTICEABLE, OUTLIER, normal_quantile
 from pipeline.numerics.robust import mad_sigma, median
-from pipeline.samples.condition import Conditioned
+from pipeline.samples.condition import Samples
 from pipeline.track import F8, U8, Quality
 from pipeline.windows.cycles import Cycles
-from pipeline.windows.sinusoids import Solution, Tuning, Windows, quantile, refit, retune, solve, unwrap
+from pipeline.windows.sinusoids import Tuning, WindowFits, WindowSamples, quantile, refit, retune, solve, unwrap
 
 # Amplitude in standard uncertainties below which amplitude and phase are taken along a smooth phase. Its phase is then
 # uncertain by 1/7 rad, and the probability that noise turns it by more than 1 rad is 3e-12.
@@ -40,11 +40,11 @@ CLIP_SIGMAS = 4.0
 MINORITY = 0.3
 # Number of reweighted fits of windows with false echoes, before the final fits. With five, a few echoes differ in one
 # of five recordings, and no verdict, as measured by `python -m tests.golden` and `python -m tests.trials.troubles`.
-ROUNDS = 3
+REWEIGHTINGS = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Demodulated:
+class Windows:
     """The oscillation in windows of whole periods, on which every later stage works.
 
     In window j the motion is :math:`o_j + A_j e^{-g\\tau}\\cos(\\omega\\tau + \\varphi_j)`, with :math:`\\tau`
@@ -57,7 +57,7 @@ class Demodulated:
     amplitude: F8
     phase: F8
     offset: F8
-    noise: F8  # (w,) m, standard deviation of the samples about the fit, for each window separately
+    noises: F8  # (w,) m, standard deviation of the samples about the fit, for each window separately
     # (w, 3, 3) covariance of (amplitude, phase, offset). Windows share no samples, so they are independent of each
     # other.
     covariance: F8
@@ -69,13 +69,13 @@ class Demodulated:
     lost: int  # number of windows with too few usable samples, which give no point
 
     @cached_property
-    def noise_m(self) -> float:
+    def noise(self) -> float:
         """Standard deviation of one sample over the whole record, m."""
         dof = np.maximum(self.count - 3, 1)
-        return math.sqrt(float((dof * self.noise**2).sum()) / float(dof.sum()))
+        return math.sqrt(float((dof * self.noises**2).sum()) / float(dof.sum()))
 
 
-def demodulate(conditioned: Conditioned, cycles: Cycles) -> Demodulated:
+def demodulate(samples: Samples, cycles: Cycles) -> Windows:
     """Fit rest position, amplitude and phase robustly in every window.
 
     Every window is a linear least-squares problem in :math:`(o, a, b)` of
@@ -86,30 +86,29 @@ def demodulate(conditioned: Conditioned, cycles: Cycles) -> Demodulated:
     :data:`CLIP_SIGMAS` are excluded permanently. A second pass uses the decay :math:`g` of each window. Without it, the
     conjugate line would bias the amplitude by the fraction :math:`g/2\\omega`.
     """
-    windows = Windows.cut(conditioned, cycles.bounds)
+    windows = WindowSamples.sliced(samples, cycles.bounds)
     tuning = Tuning.constant(2.0 * math.pi * cycles.frequency_hz, len(windows.y))
     basis = windows.basis(tuning.turning, tuning.decay)
     rough = retune(windows, solve(basis, windows.usable), tuning.angular_frequency, degree=1)
     basis = windows.decaying(basis, rough.decay)
-    solution, spread = _ignore_clusters(windows, basis, conditioned.noise_m)
-    _rescue(windows, basis, solution, spread, tuning)
-    _clip(windows, basis, solution, spread, rough)
+    solution, spread = _ignore_clusters(windows, basis, samples.noise)
+    solution, spread = _rescue(windows, basis, solution, spread, tuning)
+    solution = _clip(windows, basis, solution, spread, rough)
     weights = solution.weights
-    if conditioned.clipped_from_m:
+    if samples.clipped_from:
         level = _typical(_spread(windows.usable, solution.residual), windows, solution)
-        crest = conditioned.near_plateau(windows.y - solution.residual + windows.level, level)
+        crest = samples.near_plateau(windows.y - solution.residual + windows.level, level)
         windows = replace(windows, usable=np.where(crest, 0.0, windows.usable))
         weights = np.where(crest, 0.0, weights)
     # Fit again with each window's own frequency and decay.
     tuning = retune(windows, solution, tuning.angular_frequency)
     basis = windows.basis(tuning.turning, tuning.decay)
     solution = solve(basis, weights)
-    spread = _spread(windows.usable, solution.residual)
-    _clip(windows, basis, solution, spread, tuning)
-    return _finish(conditioned, windows, solution, tuning)
+    solution = _clip(windows, basis, solution, _spread(windows.usable, solution.residual), tuning)
+    return _finish(samples, windows, solution, tuning)
 
 
-def follow(cycles: Cycles, windows: Demodulated, recorded: F8) -> Cycles:
+def follow(cycles: Cycles, windows: Windows, recorded: F8) -> Cycles:
     """Cut the windows anew, along the phase, if the period changes: those of equal length are then no whole periods."""
     t, phase, u_phase = windows.t, windows.phase, np.sqrt(windows.covariance[:, 1, 1])
     span = FEWEST_FOR_LINE
@@ -131,32 +130,32 @@ def follow(cycles: Cycles, windows: Demodulated, recorded: F8) -> Cycles:
     return replace(cycles, bounds=bounds[np.concatenate([[True], bounds[1:] > bounds[:-1]])])
 
 
-def _ignore_clusters(windows: Windows, basis: F8, noise_m: float) -> tuple[Solution, F8]:
+def _ignore_clusters(windows: WindowSamples, basis: F8, noise: float) -> tuple[WindowFits, F8]:
     """Fit every window; where the scatter exceeds the noise, use weights that ignore clusters of echoes.
 
     Returns the fits and the spreads (w,) of the samples about them.
     """
-    solution = solve(basis, windows.usable.copy())  # a copy: changes of the solution must not reach the windows
+    solution = solve(basis, windows.usable)
     spread = _spread(windows.usable, solution.residual)
-    odd = np.flatnonzero(spread > 1.3 * noise_m)
+    odd = np.flatnonzero(spread > 1.3 * noise)
     if odd.size:
-        size, least = np.abs(solution.residual[odd]), noise_m + windows.tiny
-        solution.put(odd, _reweighted(basis[odd], windows.usable[odd], size, 0.5, least, ROUNDS))
+        size, least = np.abs(solution.residual[odd]), noise + windows.tiny
+        solution = solution.put(odd, _reweighted(basis[odd], windows.usable[odd], size, 0.5, least))
         spread[odd] = _spread(windows.usable[odd], solution.residual[odd])
     return solution, spread
 
 
-def _rescue(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning: Tuning) -> None:
+def _rescue(
+    windows: WindowSamples, basis: F8, solution: WindowFits, spread: F8, tuning: Tuning
+) -> tuple[WindowFits, F8]:
     """Fit windows that disagree with their neighbours again, starting from the neighbours' prediction.
-
-    The solution and its spreads are updated in place.
 
     Where half of a window consists of false echoes, its own fit may have converged to them. The amplitude, phase and
     rest position of the surrounding windows show which half to believe.
     """
     n = len(windows.y)
-    if n < 5:
-        return
+    if n < FEWEST_FOR_LINE:
+        return solution, spread
     # The phases are referred to one instant, so that medians are taken of slowly varying quantities.
     turning = np.exp(1j * tuning.angular_frequency * (windows.centre - windows.centre[0]))
     steady = (solution.coefficients[:, 1] + 1j * solution.coefficients[:, 2]) / turning
@@ -171,24 +170,25 @@ def _rescue(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning:
     few = before < 0.7 * windows.usable.sum(axis=1)
     odd = np.flatnonzero((away > OUTLIER * mad_sigma(away)) | few | ~solution.good)
     if not odd.size:
-        return
+        return solution, spread
     part, usable = basis[odd], windows.usable[odd]
     size = np.abs(part[:, 3] - (expected[odd, None, :] @ part[:, :3])[:, 0])
     # Only the best samples set the scale, so that echoes may make up more than half of a window.
-    trial = _reweighted(part, usable, size, MINORITY, level, ROUNDS)
+    trial = _reweighted(part, usable, size, MINORITY, level)
     after = np.sum((np.abs(trial.residual) <= bound) * usable, axis=1)
     better = trial.good & ((after > before[odd]) | ~solution.good[odd])
-    solution.put(odd[better], trial, better)
+    spread = spread.copy()
     spread[odd[better]] = _spread(usable[better], trial.residual[better])
+    return solution.put(odd[better], trial, better), spread
 
 
-def _reweighted(basis: F8, usable: F8, size: F8, believed: float, least: float, rounds: int) -> Solution:
+def _reweighted(basis: F8, usable: F8, size: F8, believed: float, least: float) -> WindowFits:
     """Fit windows with weights of Cauchy's form, :math:`(1 + (r/s)^2)^{-2}`, from residuals of a given size (w, l).
 
     The scale s is the quantile of the residuals at the share ``believed``, over that of normal deviates, but at least
     ``least``.
     """
-    for _ in range(rounds):
+    for _ in range(REWEIGHTINGS):
         spread = np.maximum(quantile(size, usable, believed) / normal_quantile(believed), least)
         solution = solve(basis, usable / (1.0 + (size / spread[:, None]) ** 2) ** 2)
         size = np.abs(solution.residual)
@@ -209,19 +209,19 @@ def _spread(usable: F8, residual: F8) -> F8:
     return quantile(np.abs(residual), usable, 0.5) / normal_quantile(0.5)
 
 
-def _typical(spread: F8, windows: Windows, solution: Solution) -> float:
+def _typical(spread: F8, windows: WindowSamples, solution: WindowFits) -> float:
     """Return the median spread of the record's good windows."""
     return max(median(spread[solution.good]) if solution.good.any() else 0.0, windows.tiny)
 
 
-def _clip(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning: Tuning) -> None:
+def _clip(windows: WindowSamples, basis: F8, solution: WindowFits, spread: F8, tuning: Tuning) -> WindowFits:
     """Exclude samples with residuals beyond the clipping bound and fit again."""
     level = _typical(spread, windows, solution)
     # One window's spread is uncertain, and a cluster of echoes widens it, so it is kept near the record's.
     size = np.hypot(solution.coefficients[:, 1], solution.coefficients[:, 2])
     least = model_error(size, tuning.decay, tuning.angular_frequency)
     bound = CLIP_SIGMAS * np.maximum(np.clip(spread, 0.75 * level, 2.0 * level), least)
-    refit(basis, solution, np.where(np.abs(solution.residual) <= bound[:, None], windows.usable, 0.0))
+    return refit(basis, solution, np.where(np.abs(solution.residual) <= bound[:, None], windows.usable, 0.0))
 
 
 def model_error(amplitude: F8, decay: F8, angular_frequency: float) -> F8:
@@ -232,7 +232,7 @@ def model_error(amplitude: F8, decay: F8, angular_frequency: float) -> F8:
     return (FINEST + np.abs(decay) / (10.0 * angular_frequency)) * np.abs(amplitude)
 
 
-def _finish(conditioned: Conditioned, windows: Windows, solution: Solution, tuning: Tuning) -> Demodulated:
+def _finish(samples: Samples, windows: WindowSamples, solution: WindowFits, tuning: Tuning) -> Windows:
     good, weights = solution.good, solution.weights
     if not good.any():
         raise AnalysisError(
@@ -242,7 +242,7 @@ def _finish(conditioned: Conditioned, windows: Windows, solution: Solution, tuni
     squares = np.sum(weights * solution.residual**2, axis=1)
     noise = np.sqrt(squares / np.maximum(counts - 3, 1))
     pooled = math.sqrt(np.sum(squares[good]) / max(np.sum(counts[good] - 3), 1))
-    pooled = with_prior(pooled, float(np.sum(counts[good] - 3)), conditioned.track.sigma_m)
+    pooled = with_prior(pooled, float(np.sum(counts[good] - 3)), samples.track.sigma_m)
     # A window's own noise is uncertain by about a tenth, so it is shrunk towards the record's.
     prior = 30.0
     shrunk = ((prior * pooled**2 + counts * noise**2) / (prior + counts))[good]
@@ -251,7 +251,7 @@ def _finish(conditioned: Conditioned, windows: Windows, solution: Solution, tuni
     smooth = unwrap(np.arctan2(b, a), t, tuning.angular_frequency) if tuning.phase is None else tuning.phase[good]
     expected = None if tuning.amplitude is None else tuning.amplitude[good]
     amplitude, phase, covariance = polar(a, b, solution.inverse[good] * shrunk[:, None, None], smooth, expected)
-    flags = conditioned.flags.copy()
+    flags = samples.flags.copy()
     inside = windows.placed & good[:, None]
     echoes = inside & (windows.usable > 0) & (weights == 0)
     flags[windows.rows[echoes]] |= np.uint8(Quality.FALSE_ECHO)
@@ -259,34 +259,34 @@ def _finish(conditioned: Conditioned, windows: Windows, solution: Solution, tuni
     if crests.any():
         crests &= flags[windows.rows] == 0
         flags[windows.rows[crests]] |= np.uint8(Quality.CLIPPED)
-    residual = np.full(len(conditioned.track), np.nan)
+    residual = np.full(len(samples.track), np.nan)
     residual[windows.rows[inside]] = solution.residual[inside]
-    return Demodulated(
-        t,
-        amplitude,
-        phase,
-        solution.coefficients[good, 0] + windows.level,
-        noise[good],
-        covariance,
-        counts[good],
-        tuning.angular_frequency,
-        tuning.decay[good],
-        residual,
-        flags,
-        int(np.count_nonzero(~good)),
+    return Windows(
+        t=t,
+        amplitude=amplitude,
+        phase=phase,
+        offset=solution.coefficients[good, 0] + windows.level,
+        noises=noise[good],
+        covariance=covariance,
+        count=counts[good],
+        angular_frequency=tuning.angular_frequency,
+        decay=tuning.decay[good],
+        residual=residual,
+        flags=flags,
+        lost=int(np.count_nonzero(~good)),
     )
 
 
-def with_prior(noise_m: float, dof: float, stated_m: float | None) -> float:
+def with_prior(noise: float, dof: float, stated: float | None) -> float:
     """Return the record's noise, combined with the noise that sensor or scene states if the two agree.
 
     A stated noise counts as much as thirty samples, so it matters only to records of a few periods.
     """
-    if stated_m is None or abs(noise_m / stated_m - 1.0) > normal_quantile(1.0 - FALSE_ALARM) / math.sqrt(
+    if stated is None or abs(noise / stated - 1.0) > normal_quantile(1.0 - FALSE_ALARM) / math.sqrt(
         2.0 * max(dof, 1.0)
     ):
-        return noise_m
-    return math.sqrt((dof * noise_m**2 + 30.0 * stated_m**2) / (dof + 30.0))
+        return noise
+    return math.sqrt((dof * noise**2 + 30.0 * stated**2) / (dof + 30.0))
 
 
 def polar(a: F8, b: F8, covariance: F8, smooth_phase: F8, smooth_amplitude: F8 | None) -> tuple[F8, F8, F8]:

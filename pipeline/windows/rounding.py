@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.track import F8
-from pipeline.windows.demodulate import Demodulated
+from pipeline.windows.demodulate import Windows
 
 
-def rounding_errors(amplitude: F8, quantum_m: float | None, noise_m: float) -> NDArray[np.complex128]:
+def rounding_errors(amplitude: F8, quantum: float | None, noise: float) -> NDArray[np.complex128]:
     """Return the errors (n,) of the rest position at amplitudes (n,); those of the amplitude are twice as large.
 
     The Bessel functions are taken as :math:`\\sqrt{2/\\pi z}\\cos(z - \\ldots)`, which holds from about one radian on.
@@ -28,18 +28,18 @@ def rounding_errors(amplitude: F8, quantum_m: float | None, noise_m: float) -> N
     they change together while the motion decays. The n-th sine has :math:`n^{-3}` of the variance of the first, all
     together :math:`\\zeta(3) = 1.1^2` of it.
     """
-    if not quantum_m:
+    if not quantum:
         return np.zeros(amplitude.size, complex)
-    noise_m = math.sqrt(max(noise_m**2 - quantum_m**2 / 12.0, 0.0))  # without that of rounding itself
-    turns = 2.0 * math.pi / quantum_m
+    noise = math.sqrt(max(noise**2 - quantum**2 / 12.0, 0.0))  # without that of rounding itself
+    turns = 2.0 * math.pi / quantum
     z = np.maximum(turns * np.abs(amplitude), 1.0)
-    size = 1.1 * 2.0 / turns * math.exp(-0.5 * (turns * noise_m) ** 2)
+    size = 1.1 * 2.0 / turns * math.exp(-0.5 * (turns * noise) ** 2)
     return np.asarray(size * np.sqrt(2.0 / (math.pi * z)) * np.exp(1j * z))
 
 
-def rounded(windows: Demodulated, quantum_m: float | None) -> Demodulated:
+def rounded(windows: Windows, quantum: float | None) -> Windows:
     """Return windows whose uncertainties include the rounding, so that it decides neither a law nor a drift."""
-    errors = rounding_errors(windows.amplitude, quantum_m, windows.noise_m)
+    errors = rounding_errors(windows.amplitude, quantum, windows.noise)
     variance = 0.25 * np.abs(errors) ** 2
     covariance = windows.covariance.copy()
     covariance[:, 0, 0] += 4.0 * variance

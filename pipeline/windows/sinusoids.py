@@ -1,4 +1,4 @@
-"""Windows: a record cut into whole periods, the linear fit of all windows together, and the tuning of its basis."""
+"""Windows: a record sliced into whole periods, the linear fit of all windows together, and the tuning of its basis."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pipeline.numerics.least_squares import minimise
 from pipeline.numerics.levels import FALSE_ALARM, normal_quantile
 from pipeline.numerics.robust import median
-from pipeline.samples.condition import Conditioned
+from pipeline.samples.condition import Samples
 from pipeline.track import F8
 
 # Minimum determinant of the normal matrix per sample: 1/4 for a full period, and 0.003 as measured for samples within
@@ -24,14 +24,14 @@ LEAST_SAMPLES = 6
 # One is taken if the mean squared residual falls below this factor of the lower degree's, which noise leaves at 1, and
 # if the curve follows the phases to within this angle, rad. Up to 90 degrees are then right, as measured by `pytest
 # tests/unit/pipeline/test_edges.py -k pendulum`.
-FURTHER, LESS, STEADY = (5, 8, 12), 0.5, 0.3
+FURTHER, LESS, FOLLOWED = (5, 8, 12), 0.5, 0.3
 # Maximum detuning or decay, as a fraction of the frequency; beyond it the fit has failed. With 0.1, wrong windows bend
 # the curves of one in 25 recordings, as measured by `python -m tests.golden`.
 GREATEST = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Windows:
+class WindowSamples:
     """Samples laid out as (windows, longest window), padded with unusable ones."""
 
     rows: NDArray[np.int64]  # (w, l) index of each sample in the track
@@ -46,9 +46,9 @@ class Windows:
     tiny: float
 
     @classmethod
-    def cut(cls, conditioned: Conditioned, bounds: NDArray[np.int64]) -> Windows:
-        """Cut a conditioned track at sample indices (w + 1,)."""
-        track, used = conditioned.track, conditioned.used
+    def sliced(cls, samples: Samples, bounds: NDArray[np.int64]) -> WindowSamples:
+        """Slice samples at sample indices (w + 1,)."""
+        track, used = samples.track, samples.used
         lengths = np.diff(bounds)
         slots = np.arange(int(lengths.max()))
         inside = slots[None, :] < lengths[:, None]
@@ -65,14 +65,14 @@ class Windows:
         tau = t - centre[:, None]
         placed = inside & np.isfinite(y) & (np.abs(tau) <= 2.0 * reach) | usable
         return cls(
-            rows,
-            placed,
-            usable.astype(np.float64),
-            np.where(placed, y - level, 0.0),
-            np.where(placed, tau, 0.0),
-            centre,
-            level,
-            tiny,
+            rows=rows,
+            placed=placed,
+            usable=usable.astype(np.float64),
+            y=np.where(placed, y - level, 0.0),
+            tau=np.where(placed, tau, 0.0),
+            centre=centre,
+            level=level,
+            tiny=tiny,
         )
 
     def basis(self, angular_frequency: F8, decay: F8) -> F8:
@@ -92,7 +92,7 @@ class Windows:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Solution:
+class WindowFits:
     """The fit of every window."""
 
     coefficients: F8  # (w, 3) m, rest position less level, and the coefficients a and b
@@ -113,13 +113,17 @@ class Solution:
         """(w,): sum of the variances of a and b for samples of variance 1; 0 where the window is not good."""
         return np.asarray(np.trace(self.inverse[:, 1:, 1:], axis1=1, axis2=2))
 
-    def put(self, rows: NDArray[np.int64], other: Solution, which: slice | NDArray[np.bool_] = slice(None)) -> None:
-        """Replace the fits of some windows by selected ones of another solution."""
-        for each in fields(self):
-            getattr(self, each.name)[rows] = getattr(other, each.name)[which]
+    def put(
+        self, rows: NDArray[np.int64], other: WindowFits, which: slice | NDArray[np.bool_] = slice(None)
+    ) -> WindowFits:
+        """Return these fits with some windows' replaced by selected ones of another solution."""
+        changed = {each.name: getattr(self, each.name).copy() for each in fields(self)}
+        for name, values in changed.items():
+            values[rows] = getattr(other, name)[which]
+        return WindowFits(**changed)
 
 
-def solve(basis: F8, weights: F8) -> Solution:
+def solve(basis: F8, weights: F8) -> WindowFits:
     """Fit every window by weighted least squares, as a regression on two centred and nearly orthogonal columns.
 
     This takes a third of the time that ``numpy.linalg`` needs for determinants and inverses of 160 normal matrices.
@@ -135,14 +139,13 @@ def solve(basis: F8, weights: F8) -> Solution:
     coefficients = np.empty((len(sums), 3))
     coefficients[:, 0], coefficients[:, 1], coefficients[:, 2] = good * (y - a * c - b * s), a, b
     residual = basis[:, 3] - (coefficients[:, None, :] @ basis[:, :3])[:, 0]
-    return Solution(coefficients, sums[:, :, :3], residual, good, weights)
+    return WindowFits(coefficients, sums[:, :, :3], residual, good, weights)
 
 
-def refit(basis: F8, solution: Solution, weights: F8) -> None:
-    """Update a solution, in place, for new weights; windows with unchanged weights are not fitted again."""
+def refit(basis: F8, solution: WindowFits, weights: F8) -> WindowFits:
+    """Return a solution for new weights; windows with unchanged weights are not fitted again."""
     changed = np.flatnonzero((weights != solution.weights).any(axis=1))
-    if changed.size:
-        solution.put(changed, solve(basis[changed], weights[changed]))
+    return solution.put(changed, solve(basis[changed], weights[changed])) if changed.size else solution
 
 
 def quantile(size: F8, usable: F8, share: float) -> F8:
@@ -171,7 +174,7 @@ class Tuning:
         return cls(angular_frequency, np.full(windows, angular_frequency), np.full(windows, decay))
 
 
-def retune(windows: Windows, solution: Solution, omega: float, *, degree: int = 3) -> Tuning:
+def retune(windows: WindowSamples, solution: WindowFits, omega: float, *, degree: int = 3) -> Tuning:
     """Return the tuning that follows from the phases and amplitudes of a fit."""
     if np.count_nonzero(solution.good) < 3:
         return _retune_short(windows, omega)
@@ -186,7 +189,7 @@ def retune(windows: Windows, solution: Solution, omega: float, *, degree: int = 
     place = 2.0 * (windows.centre - t[0]) / span - 1.0
     inside = np.clip(place, -1.0, 1.0)
     seen = np.stack([np.log(weight), phase], axis=1) * weight[:, None]
-    best, clear = math.inf, STEADY**2 * float(weight @ weight) / t.size
+    best, clear = math.inf, FOLLOWED**2 * float(weight @ weight) / t.size
     for trial in (degree, *(FURTHER if degree > 1 else ())):
         order = min(trial, max(1, t.size // 6))
         columns = np.polynomial.chebyshev.chebvander(inside, order)
@@ -211,14 +214,14 @@ def retune(windows: Windows, solution: Solution, omega: float, *, degree: int = 
     )
 
 
-def _u_amplitude(windows: Windows, solution: Solution) -> F8:
+def _u_amplitude(windows: WindowSamples, solution: WindowFits) -> F8:
     """Return the standard uncertainty of each window's amplitude, m, for the record's typical noise."""
     counts = np.maximum(windows.usable.sum(axis=1), 4.0)
     squares = np.einsum("wl,wl,wl->w", windows.usable, solution.residual, solution.residual) / (counts - 3.0)
     return np.asarray(np.sqrt(0.5 * median(squares[solution.good]) * solution.pair_variance))
 
 
-def _retune_short(windows: Windows, omega: float) -> Tuning:
+def _retune_short(windows: WindowSamples, omega: float) -> Tuning:
     """Return the tuning of a record with fewer than three good windows, from all its samples together.
 
     The spectrum of so few periods gives the frequency to a tenth only, which is too inaccurate for a window's phase.

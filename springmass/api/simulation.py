@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pipeline.dynamics.methods import OneStep, acceleration
 from pipeline.errors import DynamicsError
+from pipeline.simulation.methods import OneStep, acceleration
 from springmass.api.analysing import AnyScene
 from springmass.loading.scenes import scene_from
 from springmass.simulations.simulation import SimulationOptions, simulated

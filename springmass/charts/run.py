@@ -8,13 +8,14 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.analyse import Analysis, Oscillation, Overdamped
+from pipeline.analyse import Analysis, Oscillation, Relaxation
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.quantity import SHOWN, noun
+from pipeline.numerics.regression import scatter
 from pipeline.results.classic import CYCLES, Classic
 from pipeline.results.curves import Curve, Smoothed
 from pipeline.track import F8, UNUSABLE, Quality
+from pipeline.units import DISPLAY_UNITS, noun
 from springmass.charts.chart import Chart, ChartNote, Panel, Role, Series, band_of, line_of, rate_label, value_label
 from springmass.typeset import law_status, pretty
 
@@ -41,7 +42,7 @@ MOST_SLIDING = 2000  # amplitudes of the classic method, which overlap
 
 def position(a: Analysis, notes: Sequence[ChartNote] = ()) -> Chart:
     """Samples with their fit, residuals over the noise of one sample, and the rest position if it moves."""
-    track, factor = a.track, SHOWN[a.track.unit].factor
+    track, factor = a.track, DISPLAY_UNITS[a.track.unit].factor
     rows = np.flatnonzero(np.isfinite(track.t))
     rows = rows[np.argsort(track.t[rows], kind="stable")]
     t, y, used = track.t[rows], track.y[rows] * factor, used_samples(a)[rows]
@@ -57,8 +58,8 @@ def position(a: Analysis, notes: Sequence[ChartNote] = ()) -> Chart:
     flagged = [Series(f"left out ({out.size})", t[out], places, "flagged", why=why)] if out.size else []
     series = [samples, *flagged, *_marks(notes)]
     noise, motion = a.estimates["noise"], a.motion
-    sigma = pretty(Estimate(factor * noise.value, factor * noise.u, SHOWN[track.unit].unit))
-    if isinstance(motion, Overdamped):
+    sigma = pretty(Estimate(factor * noise.value, factor * noise.u, DISPLAY_UNITS[track.unit].unit))
+    if isinstance(motion, Relaxation):
         grid, curve = _relaxing(a, motion)
         series.insert(0, line_of("fit", grid, curve * factor))
     if not isinstance(motion, Oscillation):
@@ -118,7 +119,7 @@ def model_motion(motion: Oscillation, t: F8) -> tuple[F8, F8]:
     return amplitude * cosine, velocity
 
 
-def _relaxing(a: Analysis, motion: Overdamped) -> tuple[F8, F8]:
+def _relaxing(a: Analysis, motion: Relaxation) -> tuple[F8, F8]:
     """Return times and values of a relaxation: a linear fit of amplitudes and rest at the fitted rates."""
     x, used = motion.estimates, used_samples(a) & (a.track.t >= motion.start_s)
 
@@ -140,7 +141,7 @@ def _relaxing(a: Analysis, motion: Overdamped) -> tuple[F8, F8]:
 
 def _rest(a: Analysis, motion: Oscillation, factor: float) -> Panel:
     """Rest positions of the windows minus their mean, and the curve that was fitted to them."""
-    rest, windows = motion.rest, motion.demodulated
+    rest, windows = motion.rest, motion.windows
     deviation = windows.offset - rest.mean.value
     grid = np.linspace(float(windows.t.min()), float(windows.t.max()), 400)
     curve = line_of("rest position, fitted", grid, (rest.at(grid) - rest.mean.value) * factor)
@@ -154,7 +155,7 @@ def amplitude(a: Analysis, laws: Sequence[str] | None = None) -> Chart | None:
     """Amplitudes of the windows with the damping laws, and the selected law's residuals over u."""
     if not isinstance(a.motion, Oscillation):
         return None
-    damping, windows, factor = a.motion.damping, a.motion.demodulated, SHOWN[a.track.unit].factor
+    damping, windows, factor = a.motion.damping, a.motion.windows, DISPLAY_UNITS[a.track.unit].factor
     t, y, u, kept = windows.t, windows.amplitude * factor, damping.scatter.u * factor, damping.scatter.kept
     curves = _law_lines(a, a.motion, laws)
     points = Series("amplitude of one window", t[kept], y[kept], u=u[kept])
@@ -184,7 +185,7 @@ def _law_lines(a: Analysis, motion: Oscillation, laws: Sequence[str] | None) -> 
         words = "exponential, linear drag" if name == EXPONENTIAL else name
         together = name in unnamed and len(unnamed) > 1
         label = f"{len(unnamed)} other laws" if together else f"{words} ({law_status(damping, name)})"
-        curve = damping.fits[name].amplitude(grid - damping.t0) * SHOWN[a.track.unit].factor
+        curve = damping.fits[name].amplitude(grid - damping.t0) * DISPLAY_UNITS[a.track.unit].factor
         role: Role = "law" if name == damping.selected else "rest" if name in unnamed else "other"
         lines.append(line_of(label, grid, curve, role))
     return lines
@@ -193,21 +194,25 @@ def _law_lines(a: Analysis, motion: Oscillation, laws: Sequence[str] | None) -> 
 def frequency(a: Analysis) -> Chart | None:
     """Frequency of stretches of the run against their amplitude, with the model of the phase.
 
-    In each stretch a straight line is fitted to the phases of its windows, weighted by their inverse variances, which
-    are multiplied by the reduced chi-square of all phases if that exceeds one.
+    In each stretch a straight line is fitted to the phases of its windows, weighted by their inverse variances. These
+    include the scatter of the windows about a smooth curve and its correlation, or the misfit of all phases if that is
+    larger.
     """
-    if not isinstance(a.motion, Oscillation) or a.motion.demodulated.t.size < FEWEST_WINDOWS:
+    if not isinstance(a.motion, Oscillation) or a.motion.windows.t.size < FEWEST_WINDOWS:
         return None
-    phase, windows = a.motion.phase, a.motion.demodulated
+    phase, windows = a.motion.phase, a.motion.windows
     order = np.argsort(windows.t, kind="stable")
+    own = windows.covariance[:, 1, 1]
+    spread = scatter(windows.t, phase.residual, np.sqrt(own))
+    variance = np.maximum(spread.u**2 * spread.correlation, own * max(phase.reduced_chi2, 1.0))
     points = []
     for part in np.array_split(order, min(MOST_STRETCHES, order.size // 2)):
         t, turned = windows.t[part], windows.phase[part]
-        weight = 1.0 / np.maximum(windows.covariance[part, 1, 1] * max(phase.reduced_chi2, 1.0), 1e-30)
+        weight = 1.0 / np.maximum(variance[part], 1e-30)
         (slope, _), covariance = np.polyfit(t - t.mean(), turned, 1, w=np.sqrt(weight), cov="unscaled")
         points.append((float(np.mean(windows.amplitude[part])), slope, covariance[0, 0] ** 0.5))
     size, slope, u = np.array(sorted(points), np.float64).T
-    factor, mean = SHOWN[a.track.unit].factor, phase.angular_frequency.value
+    factor, mean = DISPLAY_UNITS[a.track.unit].factor, phase.angular_frequency.value
     grid = np.linspace(float(size[0]), float(size[-1]), 100)
     shift = 1e3 / (2.0 * np.pi)
     changes = phase.backbone is not None
@@ -226,7 +231,7 @@ def spectrum(a: Analysis) -> Chart | None:
     if not isinstance(a.motion, Oscillation) or (spectra := spectrum_of(a, a.motion)) is None:
         return None
     f, whole, left = spectra
-    factor, best = SHOWN[a.track.unit].factor, peaks_of(whole)
+    factor, best = DISPLAY_UNITS[a.track.unit].factor, peaks_of(whole)
     floor = float(np.median(left[left > 0])) if (left > 0).any() else float(whole.max()) * 1e-6
     lines = (
         line_of("residuals of the fit", f, left * factor, "other"),
@@ -244,7 +249,7 @@ def drag(a: Analysis) -> Chart | None:
     if not isinstance(a.motion, Oscillation):
         return None
     motion, unit = a.motion, a.track.unit
-    curve = motion.derived.drag_curve(motion.damping, motion.demodulated)
+    curve = motion.derived.drag_curve(motion.damping, motion.windows)
     if curve is None:
         return None
     # The long error bar of a stretch with hardly any damping would compress everything else.
@@ -252,7 +257,9 @@ def drag(a: Analysis) -> Chart | None:
     both = ((curve.y, curve.u), (curve.y_points, curve.u_points))
     ends = np.clip(np.concatenate([y + sign * u for y, u in both for sign in (-1, 1)]), -most, most)
     low, high = min(0.0, float(np.min(ends))), float(np.max(ends))
-    series = _with_band(curve, SHOWN[unit].factor, 1.0, "a stretch of the run", f"law {motion.damping.selected}")
+    series = _with_band(
+        curve, DISPLAY_UNITS[unit].factor, 1.0, "a stretch of the run", f"law {motion.damping.selected}"
+    )
     shown = (low, high + 0.08 * (high - low))
     panel = Panel("effective drag coefficient", series, 3.0, value_label("amplitude", unit), range=shown)
     caption = (
@@ -275,7 +282,7 @@ def energy(a: Analysis) -> Chart | None:
     if not isinstance(a.motion, Oscillation):
         return None
     motion = a.motion
-    curve = motion.derived.energy_curve(motion.damping, motion.demodulated)
+    curve = motion.derived.energy_curve(motion.damping, motion.windows)
     if curve is None:
         return None
     low, high = float(np.min(curve.y - curve.u)), float(np.max(curve.y))
@@ -306,7 +313,7 @@ def motion(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
     rows = rows[:: max(1, round(a.track.rate_hz / a.motion.cycles.frequency_hz / PER_PERIOD))]
     t, velocity, u = smoothed.t[rows], smoothed.velocity[rows], smoothed.u_velocity[rows]
     names = ("velocity", "acceleration") if unit == "m" else ("derivative", "2nd derivative")
-    k = SHOWN[unit].factor
+    k = DISPLAY_UNITS[unit].factor
     off = k * (velocity - model_motion(a.motion, t)[1])
     band = rows.size // 400 + 1  # u changes slowly
     first = [line_of(names[0], t, velocity)]
@@ -332,7 +339,7 @@ def phase(a: Analysis) -> Chart | None:
     if not isinstance(a.motion, Oscillation):
         return None
     motion, track, unit = a.motion, a.track, a.track.unit
-    factor, period = SHOWN[unit].factor, 2.0 * np.pi / a.motion.phase.angular_frequency.value
+    factor, period = DISPLAY_UNITS[unit].factor, 2.0 * np.pi / a.motion.phase.angular_frequency.value
     inside = (a.flags & Quality.OUTSIDE) == 0
     first, end = motion.damping.t0, float(np.nanmax(track.t[inside]))
     turns = max(int((end - first) / period), 1)
@@ -359,7 +366,7 @@ def classic_method(a: Analysis, classic: Classic) -> Chart | None:
     ours = amplitude(a, [a.motion.damping.selected]) if isinstance(a.motion, Oscillation) else None
     if ours is None:
         return None
-    factor, period = SHOWN[a.track.unit].factor, classic.estimates["period"].value
+    factor, period = DISPLAY_UNITS[a.track.unit].factor, classic.estimates["period"].value
     start, end = (float(classic.crests_t[i]) + s * 0.75 * period for i, s in ((0, -1), (-1, 1)))
     near = np.flatnonzero(used_samples(a) & (a.track.t >= start) & (a.track.t <= end))
     if not near.size:

@@ -9,10 +9,10 @@ import numpy as np
 from acquisition.errors import visible
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.bench.disc import STEADY_DISC_DRAG, disc_drag_coefficient
-from pipeline.numerics.quantity import SHOWN, noun
-from pipeline.results.compare import Comparison
-from pipeline.results.masses import Hooke, MassLine
+from pipeline.several.compare import Comparison
+from pipeline.several.masses import Hooke, MassLine
 from pipeline.track import F8
+from pipeline.units import DISPLAY_UNITS, noun
 from springmass.charts.chart import Chart, Panel, Series, band_of, line_of, value_label
 from springmass.charts.run import DETAIL_PERIODS, used_samples
 from springmass.typeset import prefixed, pretty
@@ -32,7 +32,7 @@ def overlay(names: Sequence[str], analyses: Sequence[Analysis]) -> Chart | None:
         rest = np.full(t.size, np.mean(y))
         if isinstance(motion, Oscillation):
             rest, fastest = motion.rest.at(t), max(fastest, motion.cycles.frequency_hz)
-        series.append(line_of(visible(name), t - t[0], (y - rest) * SHOWN[unit].factor, "other"))
+        series.append(line_of(visible(name), t - t[0], (y - rest) * DISPLAY_UNITS[unit].factor, "other"))
     what = "displacement" if unit == "m" else f"{noun(unit)} from rest"
     panel = Panel(value_label(what, unit), tuple(series), x_label="time since the first sample used / s")
     caption = "Displacement of every run from its rest position."
@@ -152,7 +152,7 @@ def drag_points(analysis: Analysis) -> list[list[float]]:
     if not isinstance(motion, Oscillation):
         return []
     derived = motion.derived
-    curve = derived.drag_curve(motion.damping, motion.demodulated)
+    curve = derived.drag_curve(motion.damping, motion.windows)
     if curve is None or diameter is None or derived.displacement is None or "reynolds_number" not in estimates:
         return []
     lengths: F8 = curve.x * derived.displacement.value

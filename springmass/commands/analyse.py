@@ -28,9 +28,9 @@ from springmass.commands.options import (
     Scenes,
     Strict,
 )
-from springmass.commands.parameters import Finite, argument, flag, option, output
-from springmass.commands.questions import for_command, option_words
-from springmass.errors import HINT, LOG, OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError
+from springmass.commands.parameters import Finite, PartsPerMillion, argument, flag, option, output
+from springmass.commands.questions import for_one
+from springmass.errors import HINT, LOG, OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, of_several
 from springmass.layout import STDIN
 from springmass.loading.inputs import files_of
 from springmass.loading.notes import keep_answers
@@ -54,6 +54,9 @@ class AnalyseOptions:
     scene: Scenes = ()
     from_s: Annotated[Finite | None, option("S", "use samples from this time on, s", "--from")] = None
     to_s: Annotated[Finite | None, option("S", "use samples up to this time, s", "--to")] = None
+    clock_ppm: Annotated[
+        PartsPerMillion | None, option("PPM", "largest rate error of the sensor's clock (default: that of its family)")
+    ] = None
     method: Annotated[
         Literal["classic"] | None,
         option("NAME", "also apply the lab report's classic method, for comparison"),
@@ -85,7 +88,8 @@ def analyse(
 ) -> int:
     """Analyse every input; if one fails, the others still give results."""
     inputs = [str(each) for each in recordings]
-    how = analysis.of(read, method=options.method, from_s=options.from_s, to_s=options.to_s)
+    own = {name: getattr(options, name) for name in ("from_s", "to_s", "clock_ppm", "method")}
+    how = analysis.of(read, **own)
     if options.keep and (not read.about_the_file().given() or STDIN in inputs):
         raise ProgramError("--keep keeps options of reading such as --unit next to a file", "give one, and the file")
     if how.velocity is not None and (len(inputs) > 1 or Path(inputs[0]).is_dir()):
@@ -148,9 +152,8 @@ def _several(
     if len(runs) > 1:
         named = shlex.join(inputs)
         LOG.log(HINT, f"springmass compare {named if len(named) <= LONGEST_INPUTS else '...'}")
-    if len(set(codes)) > 1 and any(code not in (OK, REJECTED) for code in codes):
-        return SOME_FAILED
-    return max(*codes, written)
+    code = of_several(codes)
+    return code if code == SOME_FAILED else max(code, written)
 
 
 def _keep(runs: Sequence[Run], read: LoadOptions, options: AnalyseOptions) -> None:
@@ -165,12 +168,8 @@ def _keep(runs: Sequence[Run], read: LoadOptions, options: AnalyseOptions) -> No
 
 def _failed(failed: Failed) -> int:
     """Say why a recording gives no run; the remedy of a question names the command for this recording alone."""
-    task, message = failed.task, str(failed.error)
-    if failed.question is not None:
-        path = f"./{task.source}" if task.source.startswith("-") else task.source
-        words = ["springmass", "analyse", path, *option_words(task.how.given())]
-        message = str(failed.question.with_remedy(for_command(failed.question.question, words)))
-    LOG.warning(message)
+    task, asked = failed.task, failed.question
+    LOG.warning(failed.error if asked is None else for_one(asked, "analyse", task.source, task.how.given()))
     return failed.error.exit_code
 
 
@@ -189,8 +188,8 @@ def _judged(run: Run, options: AnalyseOptions) -> int:
 def _print_text(run: Run, options: AnalyseOptions) -> None:
     """Print Table 1, one sentence on damping and the warnings, and further parts on request."""
     from springmass.report.words import damping_sentence
-    from springmass.result.advice import trust_text
     from springmass.result.budget_tables import budget_text
+    from springmass.result.grades import grades_text
     from springmass.terminal.printing import classic_text, findings_text, fitted, text_table, wrapped
     from springmass.terminal.style import style_of
     from springmass.typeset import typeset
@@ -201,7 +200,7 @@ def _print_text(run: Run, options: AnalyseOptions) -> None:
         print(f"{classic_text(run.classic)}\n")
     if options.full and (budget := budget_text(run.analysis)):
         print(f"{fitted(budget, style.width) if style.terminal else budget}\n")
-    for text in (trust_text(run.analysis, page=style.unicode), damping_sentence(run.analysis)):
+    for text in (grades_text(run.analysis, page=style.unicode), damping_sentence(run.analysis)):
         if text:
             print(f"{wrapped(text, '', 80)}\n")
     print(findings_text(run.result["findings"], typeset if style.unicode else str, full=options.full))

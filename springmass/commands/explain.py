@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from difflib import get_close_matches
 from typing import Annotated
 
-from pipeline.findings.finding import Kind, kinds, usual_advice, word
-from pipeline.registry.found import Found
+from pipeline.findings.finding import FindingKind, kinds, usual_advice, word
+from pipeline.notice import Notice
 from springmass.commands.options import Json
 from springmass.commands.parameters import argument
 from springmass.errors import OK, ProgramError
@@ -40,7 +40,7 @@ def explain(
     return OK
 
 
-def _fields(code: str, kind: Kind) -> dict[str, object]:
+def _fields(code: str, kind: FindingKind) -> dict[str, object]:
     return {
         "code": code,
         "severities": list(kind.severity),
@@ -48,18 +48,18 @@ def _fields(code: str, kind: Kind) -> dict[str, object]:
         "meaning": kind.meaning,
         "cause": kind.cause,
         "advice": usual_advice(code),
-        "example": word(Found(code, kind.example)).message,
+        "example": word(Notice(code, kind.example)).message,
         "figure": kind.figure,
     }
 
 
-def _explained(code: str, kind: Kind) -> str:
+def _explained(code: str, kind: FindingKind) -> str:
     severity = " or ".join("note" if each == "info" else each for each in kind.severity)
     rows = [
         ("Meaning", kind.meaning),
         ("Cause", kind.cause),
         ("Advice", usual_advice(code) or "Nothing needs doing."),
-        ("Example", word(Found(code, kind.example)).message),
+        ("Example", word(Notice(code, kind.example)).message),
     ]
     if kind.figure:
         rows.append(("Figure", f"The {kind.figure} figure of the report shows it."))
@@ -69,7 +69,7 @@ def _explained(code: str, kind: Kind) -> str:
     )
 
 
-def _listed(all_kinds: Mapping[str, Kind]) -> str:
+def _listed(all_kinds: Mapping[str, FindingKind]) -> str:
     groups: dict[str, list[str]] = {}
     for code, kind in all_kinds.items():
         groups.setdefault(kind.symptom, []).append(wrapped(f"  {code}: {kind.meaning}", " " * 6, PAGE_WIDTH))

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter, Token
 
-from pipeline.registry.laws import ANY_LAW, law_names
+from pipeline.bench.law_names import ANY_LAW, law_names
 
 
 def argument(name: str, words: str, *, required: bool | None = None) -> Parameter:

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from acquisition.errors import visible
-from pipeline.dynamics.band import Band
 from pipeline.results.effects import Effect
+from pipeline.simulation.band import Band
 from springmass.commands.given import GivenOptions
 from springmass.commands.options import FiguresOption, FileArgument, Json, Overwrite, ReadPairs
 from springmass.commands.parameters import Finite, Positive, Whole, flag, option, output

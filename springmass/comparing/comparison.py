@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 from pipeline.analyse import Oscillation
 from pipeline.bench.scene import Scene
-from pipeline.damping.joint import JointDamping, JointFit, join
 from pipeline.errors import AnalysisError
 from pipeline.findings.finding import Finding, by_severity, word
+from pipeline.notice import Notice
 from pipeline.numerics.estimate import Estimate
-from pipeline.registry.found import Found
-from pipeline.results.compare import Comparison, SpringRun, compare_springs
 from pipeline.results.derive import limited
-from pipeline.results.masses import Hooke, MassLine, mass_line
+from pipeline.several.compare import Comparison, SpringRun, compare_springs
+from pipeline.several.joint import JointDamping, JointFit, join
+from pipeline.several.masses import Hooke, MassLine, mass_line
 from springmass.comparing.reported import Reported, judge, read_reported
 from springmass.comparing.user_table import read_hooke
 from springmass.errors import ProgramError
@@ -114,7 +114,7 @@ def compare_runs(
         springs, spring_mass_kg=runs[0].scene.spring_mass_kg, mass_correlation=mass_correlation
     )
     joint = tuple(
-        join([(name, m.damping, float(m.demodulated.t[-1]) - m.damping.t0) for name, m in group])
+        join([(name, m.damping, float(m.windows.t[-1]) - m.damping.t0) for name, m in group])
         for group in _of_one_bob(motions, [run.scene for run in runs])
     )
     judged, mistakes = judge(read_reported(reported, runs), runs) if reported is not None else ((), ())
@@ -211,10 +211,10 @@ def _of_one_bob(motions: list[tuple[str, Oscillation]], scenes: list[Scene]) -> 
 def _findings(comparison: Comparison, joint: Sequence[JointDamping]) -> list[Finding]:
     findings = []
     if comparison.exchanged:
-        findings.append(Found("runs_exchanged", {"sentence": comparison.message}))
+        findings.append(Notice("runs_exchanged", {"sentence": comparison.message}))
     elif not comparison.agree:
-        findings.append(Found("springs_differ", {"sentence": comparison.message}))
-    findings += [Found("laws_differ", {"sentence": of_bob.message}) for of_bob in joint if not of_bob.one_law]
+        findings.append(Notice("springs_differ", {"sentence": comparison.message}))
+    findings += [Notice("laws_differ", {"sentence": of_bob.message}) for of_bob in joint if not of_bob.one_law]
     return [word(code) for code in findings]
 
 

@@ -13,9 +13,9 @@ import numpy as np
 from acquisition.units import measure_of, time_unit
 from pipeline.analyse import Oscillation
 from pipeline.findings.finding import Finding, by_severity, word
+from pipeline.notice import Notice
 from pipeline.numerics.estimate import Estimate
-from pipeline.registry.found import Found
-from pipeline.registry.quantities import QUANTITIES
+from pipeline.quantities import QUANTITIES
 from pipeline.results.classic import CYCLES, READING_S, STATED_ERROR_M
 from springmass.comparing.user_table import Row, read_rows
 from springmass.errors import ProgramError
@@ -94,7 +94,7 @@ def judge(rows: Sequence[Reported], runs: Sequence[Run]) -> tuple[tuple[Reported
     """Return each row with its verdict, and a finding for each mistake, the most severe first."""
     by_name = {run.name: run for run in runs}
     judged: list[Reported] = []
-    mistakes: list[Found] = []
+    mistakes: list[Notice] = []
     exchanged: dict[str, list[str]] = {}
     for row in rows:
         run = by_name[row.run]
@@ -114,7 +114,7 @@ def judge(rows: Sequence[Reported], runs: Sequence[Run]) -> tuple[tuple[Reported
             verdict = also if verdict == "agrees" else f"{verdict}; {also}"
         mistakes += [each for each in (wrong, small) if each is not None]
         judged.append(replace(row, found=expected[0], verdict=verdict))
-    mixed = [Found("reported_exchanged", {"runs": p, "names": ", ".join(each)}) for p, each in exchanged.items()]
+    mixed = [Notice("reported_exchanged", {"runs": p, "names": ", ".join(each)}) for p, each in exchanged.items()]
     return tuple(judged), by_severity(word(each) for each in (*mixed, *mistakes))
 
 
@@ -143,7 +143,7 @@ def _agrees(run: Run, row: Reported, expected: Estimate, scale: float = 1.0, rou
     return abs(row.value * scale - expected.value) <= max(allowed, roughly * abs(expected.value))
 
 
-def _value(row: Reported, run: Run, others: Mapping[str, Run]) -> tuple[str, Found | None, float | None]:
+def _value(row: Reported, run: Run, others: Mapping[str, Run]) -> tuple[str, Notice | None, float | None]:
     """Return the verdict on a value, or the run that it was exchanged with; the mistake; and the factor that mends it.
 
     The factor is None where the uncertainty of the value cannot be judged.
@@ -154,14 +154,14 @@ def _value(row: Reported, run: Run, others: Mapping[str, Run]) -> tuple[str, Fou
     if row.name == "noise":
         if ours.value < TOO_SMALL * row.value and row.value < TOO_SMALL * ours.value:
             return "agrees", None, None
-        return "not the noise of a sample", Found("reported_not_noise", about), None
+        return "not the noise of a sample", Notice("reported_not_noise", about), None
     linear = motion.damping.fits.get("linear") if isinstance(motion, Oscillation) else None
     if row.name in ("damping_rate", "gamma") and linear is not None and linear.rejection:
         if _agrees(run, row, ours):
             return "agrees", None, 1.0
-        return "an exponential does not describe this decay", Found("reported_not_exponential", about), 1.0
+        return "an exponential does not describe this decay", Notice("reported_not_exponential", about), 1.0
     if (echoes := _echoes(row, run, ours)) is not None:
-        return "the velocities include false echoes", Found("reported_false_echoes", {**about, **echoes}), 1.0
+        return "the velocities include false echoes", Notice("reported_false_echoes", {**about, **echoes}), 1.0
     # A spring that nobody weighed makes k so uncertain that even exchanged values would agree: it counts last.
     unweighed = row.name == "spring_constant" and run.scene.spring_mass_kg is None
     hypotheses = [("agrees", each) for each in expected[unweighed:]]
@@ -173,10 +173,10 @@ def _value(row: Reported, run: Run, others: Mapping[str, Run]) -> tuple[str, Fou
     for power in POWERS:
         if any(_agrees(run, row, each, 10.0**power, ROUGHLY) for _, each in hypotheses):
             about["factor"] = f"{10 ** abs(power):,} times too {'small' if power > 0 else 'large'}"
-            return about["factor"], Found("reported_power_of_ten", about), 10.0**power
+            return about["factor"], Notice("reported_power_of_ten", about), 10.0**power
     far = abs(row.value - ours.value) / math.hypot(max(row.u, row.rounding), ours.u)
     about["apart"] = f"{far:,.0f}" if far < 1e6 else "over a million"
-    return "differs", Found("reported_differs", about), None
+    return "differs", Notice("reported_differs", about), None
 
 
 def _echoes(row: Reported, run: Run, ours: Estimate) -> dict[str, float] | None:
@@ -197,7 +197,7 @@ def _echoes(row: Reported, run: Run, ours: Estimate) -> dict[str, float] | None:
     return {"echoes": echoes, "ratio": ratio}
 
 
-def _uncertainty(row: Reported, scale: float, run: Run, rows: Sequence[Reported]) -> Found | None:
+def _uncertainty(row: Reported, scale: float, run: Run, rows: Sequence[Reported]) -> Notice | None:
     """Return a finding if an uncertainty is smaller than what is sure to be in it.
 
     That is the u of the quantity that the report derives it from, by its own numbers; the u of this analysis, which
@@ -222,7 +222,7 @@ def _uncertainty(row: Reported, scale: float, run: Run, rows: Sequence[Reported]
     if u * TOO_SMALL > least:
         return None
     about = {"run": row.run, "name": _word(row.name), "printed": row.printed, "words": words}
-    return Found("reported_u_too_small", {**about, "times": f"{least / u:,.0f}"})
+    return Notice("reported_u_too_small", {**about, "times": f"{least / u:,.0f}"})
 
 
 def _word(name: str) -> str:

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.regular_file import open_regular_text
-from pipeline.results.masses import Hooke, hooke
+from pipeline.several.masses import Hooke, hooke
 from springmass.errors import ProgramError
 
 LARGEST_TABLE_BYTES = 64 << 20  # bytes

@@ -13,8 +13,8 @@ import numpy as np
 
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
-from pipeline.results.compare import SpringRun
-from pipeline.results.course import Agreement, CourseRun, Disagreement, Suspect, agreement, judged
+from pipeline.several.compare import SpringRun
+from pipeline.several.course import Agreement, CourseRun, Disagreement, Suspect, agreement, judged
 from springmass.course.results_csv import COURSE
 from springmass.errors import UNREADABLE, ProgramError
 
@@ -76,7 +76,17 @@ def _agreement(quantity: str, name: str, group: Sequence[CourseRun]) -> Agreemen
     called = _NAMES[quantity]
     if not group:
         why = "all its runs are among those that differ"
-        return Agreement(called, name, None, math.nan, math.nan, math.nan, 0, 0, why=why)
+        return Agreement(
+            quantity=called,
+            group=name,
+            mean=None,
+            within=math.nan,
+            between=math.nan,
+            stated=math.nan,
+            runs=0,
+            benches=0,
+            why=why,
+        )
     values = [getattr(run, quantity) for run in group]
     agreed = agreement(called, name, values, [run.bench for run in group])
     scatter = max(x for x in (agreed.within, agreed.between, 0.0) if not math.isnan(x))

@@ -12,7 +12,7 @@ import numpy as np
 
 from acquisition.errors import visible
 from pipeline.numerics.estimate import Estimate
-from pipeline.results.course import LITTLE
+from pipeline.several.course import LITTLE
 from springmass.charts.chart import Chart
 from springmass.charts.several import course, drag_map
 from springmass.course.benches import BENCHES, CourseComparison

@@ -22,8 +22,8 @@ from typing import Any
 from acquisition.recordings.identify import dialect_folder
 from acquisition.recordings.reading import READ_FIELDS, ValueKind
 from acquisition.regular_file import open_regular, read_regular
+from pipeline.bench.law_names import ANY_LAW, law_names
 from pipeline.bench.scene import PLACES, Scene
-from pipeline.registry.laws import ANY_LAW, law_names
 from springmass import __version__
 from springmass.comparing.user_table import Row, read_rows
 from springmass.course.results_csv import RESERVED

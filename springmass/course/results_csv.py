@@ -11,7 +11,7 @@ from typing import Any
 
 from acquisition.regular_file import open_regular_text
 from pipeline.bench.scene import PLACES
-from pipeline.registry.quantities import QUANTITIES
+from pipeline.quantities import QUANTITIES
 from springmass.errors import UNREADABLE, ProgramError
 from springmass.typeset import cell
 from storage.atomic import whole_file, writing

@@ -15,7 +15,7 @@ from pipeline.analyse import Analysis, Oscillation
 from pipeline.bench.scene import PLACES
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate, UpperLimit
-from pipeline.results.compare import SpringRun
+from pipeline.several.compare import SpringRun
 from springmass.charts.several import LARGEST_DRAWN, drag_points, outline
 from springmass.course.plan import digest_of, digests_of, software
 from springmass.course.results_csv import ESTIMATES

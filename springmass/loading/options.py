@@ -8,10 +8,10 @@ from types import EllipsisType
 from typing import Any, Literal
 
 from acquisition.recordings.reading import ReadOptions, ValueKind, words_of
+from pipeline.bench.law_names import ANY_LAW
 from pipeline.damping.laws import LAWS, Law, find_law
 from pipeline.errors import AnalysisError
 from pipeline.options import Options, options_for
-from pipeline.registry.laws import ANY_LAW
 
 Accuracy = Literal["fast", "standard", "best"]
 

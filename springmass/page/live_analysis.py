@@ -78,7 +78,7 @@ def _amplitude_now(motion: Oscillation, unit: str) -> dict[str, Estimate]:
     weights = motion.damping.scatter.u[kept] ** -2.0
     if kept.size < 2 or not np.isfinite(weights).all():
         return {}
-    mean = float(np.average(motion.demodulated.amplitude[kept], weights=weights))
+    mean = float(np.average(motion.windows.amplitude[kept], weights=weights))
     return {"amplitude_now": Estimate(mean, float(weights.sum() ** -0.5), unit)}
 
 
@@ -135,7 +135,7 @@ def _latest_fit(motion: Oscillation) -> dict[str, Any]:
 
     ``decay`` is the amplitude of the damping law divided by its amplitude at ``moment``, in even steps of time.
     """
-    windows, damping = motion.demodulated, motion.damping
+    windows, damping = motion.windows, motion.damping
     after = np.linspace(-FIT_BEFORE_S, FIT_AFTER_S, FIT_POINTS)
     curve = damping.best.amplitude(np.maximum(windows.t[-1] + after - damping.t0, 0.0))
     now = float(damping.best.amplitude(windows.t[-1:] - damping.t0)[0])

@@ -13,15 +13,16 @@ from acquisition.errors import visible
 from pipeline.analyse import Oscillation
 from pipeline.findings.finding import kinds
 from pipeline.numerics.estimate import Estimate
-from pipeline.registry.quantities import EFFECTS, INPUTS
+from pipeline.quantities import EFFECTS, INPUTS
 from pipeline.track import Track
 from springmass.charts.browser import chart_style, report_source
 from springmass.charts.chart import Chart, to_json
 from springmass.comparing.comparison import SpringComparison, line_and_hooke_words
 from springmass.report.recorded import bench_words, calibration_of, date_words, notes_of
 from springmass.report.words import method, summary
-from springmass.result.advice import notices_of, trust_of
+from springmass.result.advice import notices_of
 from springmass.result.budget_tables import budgets_of
+from springmass.result.grades import all_sound, grades_of, leaves_more_than_noise
 from springmass.result.law_rows import laws_across, laws_of
 from springmass.result.table1 import rows_and_needs, table_rows
 from springmass.runs.run import Run
@@ -158,10 +159,11 @@ def _tables(runs: Sequence[Run]) -> Iterator[dict[str, Any]]:
             replace(row, estimates=tuple(None if x is None else prefixed(x) for x in row.estimates))
             for row in rows_and_needs([run.analysis for run in some])
         ]
-        trust = trust_of(some[0].analysis) if len(runs) == 1 else {}
-        sound = bool(trust) and all(of_value.grade == "sound" for of_value in trust.values())
+        graded = grades_of(some[0].analysis) if len(runs) == 1 else {}
+        shown = {row.name: graded[row.name] for row in rows if row.name in graded}
+        sound = all_sound(shown) and not leaves_more_than_noise(some[0].analysis)
         names = [run.name for run in some]
-        yield {"names": names, "rows": rows, "trust": {} if sound else trust, "all_sound": sound}
+        yield {"names": names, "rows": rows, "grades": {} if sound else shown, "all_sound": sound}
 
 
 def _part(index: int, run: Run, charts: Mapping[str, Chart], figures: Figures, stem: str) -> dict[str, Any]:

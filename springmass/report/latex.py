@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from acquisition.errors import visible
 from pipeline.analyse import Analysis
 from pipeline.numerics.estimate import Estimate, UpperLimit, format_limit, in_brackets
-from pipeline.registry.quantities import INPUTS
+from pipeline.quantities import INPUTS
 from springmass.result.advice import by_harm, lab_report_line
 from springmass.result.budget_tables import budgets_of
 from springmass.result.table1 import table_rows

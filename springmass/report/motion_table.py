@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.analyse import Analysis, Oscillation
-from pipeline.numerics.quantity import Unit, noun
 from pipeline.results.curves import Smoothed
 from pipeline.track import UNUSABLE
+from pipeline.units import Unit, noun
 
 MOST_ROWS = 1_000_000
 
@@ -60,7 +60,7 @@ def amplitude_csv(analysis: Analysis) -> str:
     motion = analysis.motion
     if not isinstance(motion, Oscillation):
         return ""
-    windows, scatter, scale = motion.demodulated, motion.damping.scatter, motion.derived.amplitude_scale
+    windows, scatter, scale = motion.windows, motion.damping.scatter, motion.derived.amplitude_scale
     u_phase = np.sqrt(windows.covariance[:, 1, 1] * max(motion.phase.reduced_chi2, 1.0))
     table = (windows.t, scale * windows.amplitude, scale * scatter.u, windows.phase, u_phase, scatter.kept)
     word = f"amplitude{_spelt(analysis.track.unit)}"

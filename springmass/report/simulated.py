@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline.dynamics.band import LEVELS, Band
+from pipeline.simulation.band import LEVELS, Band
 from pipeline.track import F8
 from springmass.result.output_names import in_a_name, make_folder
 from springmass.simulations.run_files import write_states

@@ -6,12 +6,13 @@ from collections.abc import Sequence
 
 from pipeline.analyse import Analysis, Oscillation, Still
 from pipeline.damping.laws import words_of
-from pipeline.numerics.quantity import noun
-from pipeline.registry.quantities import INPUTS
+from pipeline.quantities import INPUTS
 from pipeline.results.budget import Contribution
 from pipeline.track import UNUSABLE
-from springmass.result.advice import harm_of, sentence, trust_of, trust_text
+from pipeline.units import noun
+from springmass.result.advice import harm_of, sentence
 from springmass.result.budget_tables import budgets_of
+from springmass.result.grades import grades_of, grades_text, leaves_more_than_noise
 from springmass.result.table1 import is_about
 from springmass.typeset import prefixed, pretty, pretty_number, typeset, unbroken
 
@@ -70,9 +71,11 @@ def damping_sentence(analysis: Analysis) -> str:
     if damping.best.rejected:
         nearest = "by far the nearest, and u of its coefficients was increased"
         if not quoted:
-            instead = "the damping rate or the amplitude against time, not their coefficients"
-            nearest = f"nearest, but others are nearly as good: quote {instead}"
-        return f"No damping law fits to within the scatter; {chosen} is {nearest}."
+            nearest = "nearest, but others are nearly as good"
+        return (
+            f"No damping law fits to within the scatter; {chosen} is {nearest}. Quote the amplitude against time "
+            "(amplitude.csv), not a damping rate."
+        )
     possible = [words_of(damping.fits[name].law) for name in damping.admissible if name != damping.selected]
     if damping.growth_rate:
         text = "The amplitude grows exponentially"
@@ -89,7 +92,7 @@ def damping_sentence(analysis: Analysis) -> str:
         if more > 1:
             possible = [*possible[:NAMED_LAWS], f"{more} more laws"]
         ruled_out = f"{listed(possible)} cannot be ruled out in {span}"
-        rate = trust_of(analysis).get("damping_rate")
+        rate = grades_of(analysis).get("damping_rate")
         if rate is None or rate.grade == "do not quote":
             return f"{text}; {ruled_out}."
         return f"{text}; {ruled_out}. The damping rate may be quoted: it allows for all of them."
@@ -148,8 +151,8 @@ def _values(analysis: Analysis, motion: Oscillation) -> str:
 
 
 def _trust(analysis: Analysis, greatest: tuple[str, Contribution] | None) -> str:
-    noise = "more than noise" if is_about(analysis, "residuals") else "only noise"
-    text = f"{trust_text(analysis, page=True)} The fit leaves {noise} in the residuals"
+    noise = "more than noise" if leaves_more_than_noise(analysis) else "only noise"
+    text = f"{grades_text(analysis, page=True)} The fit leaves {noise} in the residuals"
     if greatest is not None:
         symbol, it = greatest
         text += f"; {100.0 * it.share:.0f}\u00a0% of u({symbol})² comes from the {INPUTS[it.name].label}"

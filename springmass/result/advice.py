@@ -1,18 +1,12 @@
-"""Advice to a reader: what a finding does to the results, and the grade of each number of Table 1: may it be quoted?"""
+"""Advice to a reader: what a finding does to the results, and what a lab report should say about it."""
 
 from __future__ import annotations
 
 import enum
-from collections.abc import Container, Iterable, Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from collections.abc import Container, Iterable, Mapping
+from typing import Any
 
-from pipeline.analyse import Analysis, Oscillation
 from pipeline.findings.finding import kinds
-from pipeline.numerics.estimate import Estimate, UpperLimit
-from pipeline.numerics.quantity import Unit, exponents_of
-from pipeline.registry.quantities import INPUTS, QUANTITIES
-from springmass.result.table1 import table_estimates, table_rows
 from springmass.typeset import typeset
 
 _WORDS = {"error": "Error", "warning": "Warning", "info": "Note"}
@@ -94,99 +88,3 @@ def notices_of(findings: Iterable[Mapping[str, Any]], figures: Container[str]) -
 def sentence(text: str) -> str:
     """Start a text with a capital and end it with a full stop."""
     return f"{text[:1].upper()}{text[1:]}{'' if text[-1:] in '.!?' else '.'}"
-
-
-Grade = Literal["sound", "uncertain", "do not quote"]
-GRADES: tuple[Grade, ...] = get_args(Grade)
-UNCERTAIN = 0.05  # u over the value from which fewer than two digits are certain
-MEANINGLESS = 0.5  # u over the value from which zero is within two standard uncertainties
-_PARTS = frozenset({"times", "frequency", "distances", "scene"})
-_NOT_BY_UNIT = {
-    "spring_constant": {"scene"},
-    "reynolds_number": _PARTS,
-    "reynolds_number_start": _PARTS,
-    "keulegan_carpenter_number": {"distances", "scene"},
-    "drag_coefficient": {"distances", "scene"},
-}
-"""What a quantity is computed of beside what its unit shows."""
-
-
-@dataclass(frozen=True, slots=True)
-class Trust:
-    """Whether a number may be quoted, and why not."""
-
-    grade: Grade
-    why: str = ""
-
-
-def trust_of(analysis: Analysis) -> dict[str, Trust]:
-    """Return the trust in every quantity of Table 1 by its name; empty if nothing oscillates.
-
-    A number is uncertain if it depends on an assumption that a warning names, if fewer than two of its digits are
-    certain, or if it is an average over amplitudes at which it differs by more than 5 %. It is not to be quoted if an
-    error concerns it, if zero is within two standard uncertainties, or if the recording contradicts the law that was
-    stated for it. The worst of these decides; every reason is kept.
-    """
-    motion = analysis.motion
-    if not isinstance(motion, Oscillation):
-        return {}
-    by_name = {}
-    for key, x in table_estimates(analysis).items():
-        reasons = [*_assumed(motion, analysis, key.name), *_sized(motion, key.name, x)]
-        if motion.damping.best.rejected:
-            if QUANTITIES[key.name].by_law and motion.damping.by_statement:
-                reasons.append(Trust("do not quote", "the recording contradicts the stated law"))
-            elif key.row:
-                reasons.append(Trust("uncertain", "no damping law fits"))
-        grade = max(reasons, key=lambda each: GRADES.index(each.grade), default=Trust("sound")).grade
-        by_name[key.name] = Trust(grade, ", ".join(dict.fromkeys(each.why for each in reasons)))
-    return by_name
-
-
-def _assumed(motion: Oscillation, analysis: Analysis, name: str) -> Iterator[Trust]:
-    """Yield the errors, the unchecked assumptions and the averages on which a quantity depends."""
-    parts = _made_of(name)
-    if any(each.name == "angular_frequency" for each in motion.derived.budgets[name].contributions):
-        parts.add("frequency")
-    for finding in analysis.findings:
-        harm, concerned = harm_of(finding.code, finding.severity), _PARTS & {*kinds()[finding.code].about}
-        averaged = abs(finding.values.get("relative_shift", 0.0)) > UNCERTAIN
-        if (averaged or harm in (Harm.UNUSABLE, Harm.SCALE)) and (not concerned or concerned & parts):
-            yield Trust("do not quote" if harm is Harm.UNUSABLE else "uncertain", finding.code)
-
-
-def _made_of(name: str) -> set[str]:
-    """Return what a quantity is computed of: times, distances, the scene."""
-    unit = QUANTITIES[name].unit
-    powers = (0.0, 1.0, unit.second) if isinstance(unit, Unit) else exponents_of(unit) or ()
-    parts = {part for part, power in zip(("masses", "distances", "times"), powers, strict=False) if power}
-    return {*parts, *_NOT_BY_UNIT.get(name, ())}
-
-
-def _sized(motion: Oscillation, name: str, x: Estimate) -> Iterator[Trust]:
-    """Judge a number by its u; a rest position has an arbitrary zero, and noise is not a result."""
-    if isinstance(x, UpperLimit):
-        yield Trust("sound", "as an upper limit")
-    elif name not in ("offset", "noise") and x.u > UNCERTAIN * abs(x.value):
-        greatest = INPUTS[motion.derived.budgets[name].contributions[0].name].label
-        if x.u > MEANINGLESS * abs(x.value):
-            share = f"u is {100.0 * x.u / abs(x.value):.0f} % of it: " if x.value else ""
-            yield Trust("do not quote", f"{share}{greatest}")
-        else:
-            yield Trust("uncertain", greatest)
-
-
-def trust_text(analysis: Analysis, *, page: bool = False) -> str:
-    """Return the symbols of Table 1 in groups: sound, uncertain and not to be quoted, each with its reason."""
-    by_name = trust_of(analysis)
-    groups: dict[Grade, dict[str, list[str]]] = {grade: {} for grade in GRADES}
-    for row in table_rows([analysis]):
-        if row.name in by_name:
-            trust = by_name[row.name]
-            groups[trust.grade].setdefault(trust.why, []).append(row.on_screen if page else row.symbol)
-    parts = []
-    for grade, by_reason in groups.items():
-        words = [f"{', '.join(symbols)}{f' ({why})' if why else ''}" for why, symbols in by_reason.items()]
-        if words:
-            parts.append(f"{grade[0].upper()}{grade[1:]}: {'; '.join(words)}.")
-    return " ".join(parts)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pipeline.analyse import Analysis, Oscillation
-from pipeline.registry.quantities import INPUTS, QUANTITIES
+from pipeline.quantities import INPUTS, QUANTITIES
 from pipeline.results.budget import Budget, Contribution
 from springmass.result.table1 import table_estimates
 from springmass.typeset import cell

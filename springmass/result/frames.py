@@ -13,10 +13,10 @@ from pipeline.analyse import Analysis, Oscillation
 from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.quantity import Unit
-from pipeline.results.compare import Comparison
 from pipeline.results.curves import Smoothed
+from pipeline.several.compare import Comparison
 from pipeline.track import Quality
+from pipeline.units import Unit
 from springmass.loading.arrays import ABOUT, about_json
 from springmass.loading.loaded import Loaded
 from springmass.result.run_json import EXPANDED, picked
@@ -106,7 +106,7 @@ def run_dataset(loaded: Loaded, analysis: Analysis, name: str) -> xr.Dataset:
             for name, unit in (("position", of_value), ("velocity", of_first), ("acceleration", of_second)):
                 variables[f"smoothed_{name}"] = ("time", getattr(smoothed, name), {"units": unit})
                 variables[f"u_smoothed_{name}"] = ("time", getattr(smoothed, f"u_{name}"), {"units": unit})
-        damping, windows = motion.damping, motion.demodulated
+        damping, windows = motion.damping, motion.windows
         coordinates["window"] = ("window", windows.t, {"units": "s", "long_name": "centre of a window"})
         coordinates["law"] = ("law", list(damping.fits))
         curves = [fit.amplitude(windows.t - damping.t0) for fit in damping.fits.values()]

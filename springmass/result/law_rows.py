@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from pipeline.analyse import Oscillation
-from pipeline.damping.joint import JointDamping
 from pipeline.damping.select import Damping
 from pipeline.numerics.estimate import Estimate
+from pipeline.several.joint import JointDamping
 from springmass.typeset import equation, law_status, pretty_number, typeset
 
 

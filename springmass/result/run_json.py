@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, Any
 from acquisition.recordings.recording import FormatIssue
 from pipeline.analyse import Oscillation
 from pipeline.findings.finding import UNKNOWN_CODE, Finding, by_severity, kinds, word
+from pipeline.notice import Notice
 from pipeline.numerics.estimate import Estimate, UpperLimit
-from pipeline.registry.found import Found
 from pipeline.results.budget import Contribution
 from springmass import __version__
 from springmass.loading.loaded import Loaded
 from springmass.loading.save import now_utc
+from springmass.result.grades import grades_json
 
 if TYPE_CHECKING:
     from springmass.runs.run import Run
@@ -36,6 +37,7 @@ NO_DETAILS: Mapping[str, Any] = {
         "coefficients": {},
         "laws": {},
     },
+    "grades": {},
 }
 
 
@@ -55,7 +57,12 @@ def result_of(run: Run) -> dict[str, Any]:
     if classic is not None or not isinstance(motion, Oscillation):
         detailed = NO_DETAILS
     else:
-        detailed = {"budget": _budgets(motion), "correlations": _correlations(motion), "damping": _damping(motion)}
+        detailed = {
+            "budget": _budgets(motion),
+            "correlations": _correlations(motion),
+            "damping": _damping(motion),
+            "grades": grades_json(analysis),
+        }
     content = {
         "schema": RESULT_SCHEMA,
         "input": input_of(loaded),
@@ -110,9 +117,9 @@ def with_traps(findings: Sequence[Finding], traps: Sequence[FormatIssue]) -> tup
 
 def _of_reader(trap: FormatIssue) -> Finding:
     if trap.code in kinds():
-        return word(Found(trap.code, {"sentence": _sentence(trap.message)}))
+        return word(Notice(trap.code, {"sentence": _sentence(trap.message)}))
     # A run file may come from a version that knows more codes than this one.
-    return word(Found(UNKNOWN_CODE, {"sentence": f"{trap.code}: {trap.message}"}))
+    return word(Notice(UNKNOWN_CODE, {"sentence": f"{trap.code}: {trap.message}"}))
 
 
 def _sentence(clause: str) -> str:

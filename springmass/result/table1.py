@@ -12,7 +12,7 @@ from pipeline.analyse import Analysis, Oscillation
 from pipeline.damping.laws import LAWS
 from pipeline.findings.finding import kinds
 from pipeline.numerics.estimate import Estimate
-from pipeline.registry.quantities import QUANTITIES
+from pipeline.quantities import QUANTITIES
 from springmass.typeset import NOTHING, cell
 
 

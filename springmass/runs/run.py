@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from acquisition.recordings.recording import FormatIssue
-from pipeline.analyse import Analysis, Oscillation, Overdamped, analyse
+from pipeline.analyse import Analysis, Oscillation, Relaxation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError
 from pipeline.findings.finding import Finding
@@ -124,12 +124,12 @@ class Run(Mapping[str, Estimate]):
     @property
     def ok(self) -> bool:
         """Whether the run oscillates or relaxes, so that there is something to report."""
-        return isinstance(self.analysis.motion, Oscillation | Overdamped)
+        return isinstance(self.analysis.motion, Oscillation | Relaxation)
 
     @property
     def why(self) -> str:
         """Why the run is not ``ok``, as a sentence; empty if it is."""
-        return "" if isinstance(self.analysis.motion, Oscillation | Overdamped) else self.analysis.motion.why
+        return "" if isinstance(self.analysis.motion, Oscillation | Relaxation) else self.analysis.motion.why
 
     @property
     def law(self) -> str | None:

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.analysis import Analysis
-from pipeline.dynamics import Problem, Trajectory
-from pipeline.dynamics.band import C16, Band
 from pipeline.numerics.estimate import Estimate
-from pipeline.track import F8, UNUSABLE
+from pipeline.simulation import Problem, Trajectory
+from pipeline.simulation.band import Band
+from pipeline.track import C16, F8, UNUSABLE
 from springmass.simulations.from_run import oscillation_of
 
 WIDER = 1.96  # standard deviations of the noise by which the band is widened, for 95 %
@@ -75,7 +75,7 @@ def compare_with_run(
 
     With a band, those ``values`` of its inputs are sought that fit best.
     """
-    motion, used = oscillation_of(analysis), analysis.conditioned.used
+    motion, used = oscillation_of(analysis), analysis.samples.used
     t, measured = analysis.track.t[used], analysis.track.y[used]
     rest, good = motion.rest.at(t), (analysis.flags[used] & UNUSABLE) == 0
     free = tuple(each[good] for each in (t - t[0], measured - rest, motion.waveform.velocity[used]))
@@ -155,5 +155,5 @@ def deviation_text(against: Against) -> list[str]:
 
 def duration_s(analysis: Analysis) -> float:
     """Return the time from the first to the last used sample, s."""
-    t = analysis.track.t[analysis.conditioned.used]
+    t = analysis.track.t[analysis.samples.used]
     return float(t[-1] - t[0])

@@ -9,9 +9,9 @@ import numpy as np
 
 from acquisition.clock import Clock
 from pipeline.bench.scene import Scene
-from pipeline.dynamics import Trajectory
 from pipeline.dynamics.equation import Problem
 from pipeline.dynamics.strang import STRANG
+from pipeline.simulation import Trajectory
 from springmass.simulations.simulation import prepare
 
 REST_M = 0.25  # height of the bob's rest position above the sensor, m

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.dynamics import Trajectory, effective_mass_kg
-from pipeline.dynamics.band import Band
+from pipeline.simulation import Trajectory, effective_mass_kg
+from pipeline.simulation.band import Band
 from pipeline.track import F8
 from springmass.charts.chart import Chart, Panel, Series, band_of, line_of
 from springmass.simulations.against import Against

@@ -32,7 +32,7 @@ def scene_from_run(scene: Scene, analysis: Analysis, *, damping: bool = True) ->
     analysis.track.demand_length("a prediction laid over a run")
     motion = oscillation_of(analysis)
     scale = analysis.estimates
-    first = int(np.flatnonzero(analysis.conditioned.used)[0])
+    first = int(np.flatnonzero(analysis.samples.used)[0])
     displacement = motion.waveform.position[first] - motion.rest.at(analysis.track.t[first : first + 1])[0]
     taken: dict[str, Estimate] = {
         "start_displacement_m": Estimate(float(displacement), 0.0, "m"),

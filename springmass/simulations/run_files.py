@@ -13,7 +13,7 @@ import numpy as np
 from acquisition.block import Block, SourceInfo
 from acquisition.simulated import VirtualRangefinder, VirtualSensor
 from pipeline.bench.scene import Scene
-from pipeline.dynamics import Trajectory
+from pipeline.simulation import Trajectory
 from springmass.loading.save import made_now
 from springmass.simulations.bench import REST_M
 from springmass.simulations.simulation import FINE, Simulation, count_of, solve, summary

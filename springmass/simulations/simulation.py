@@ -13,14 +13,14 @@ import numpy as np
 from pipeline.analysis import Analysis
 from pipeline.bench.disc import DerivedDrag, derive_drag, needs_drag
 from pipeline.bench.scene import Scene
-from pipeline.dynamics import Integrator, Problem, Trajectory, get_integrator
-from pipeline.dynamics.band import STRONGEST, Band, spread, uncertain
-from pipeline.dynamics.halving import Solution, auto, demand_tolerance, halved, rounding_error, solved_once
-from pipeline.dynamics.methods import DOP853
 from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.results.effects import Effect, simulated_effects
+from pipeline.simulation import Integrator, Problem, Trajectory, get_integrator
+from pipeline.simulation.band import STRONGEST, Band, spread, uncertain
+from pipeline.simulation.halving import Solution, auto, demand_tolerance, halved, rounding_error, solved_once
+from pipeline.simulation.methods import DOP853
 from pipeline.track import F8
 from springmass.errors import LOG, ProgramError
 from springmass.result.run_json import picked, plain

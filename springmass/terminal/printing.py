@@ -11,7 +11,7 @@ from acquisition.errors import visible
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import Classic
-from pipeline.results.compare import Comparison
+from pipeline.several.compare import Comparison
 from springmass.comparing.reported import Reported
 from springmass.result.table1 import rows_and_needs
 from springmass.terminal.style import PLAIN, TerminalStyle, concise, shown

@@ -8,7 +8,7 @@ from typing import Any
 from acquisition.decoders.sensor import Sensor
 from acquisition.recordings.recording import Format
 from pipeline.damping.laws import Law
-from pipeline.dynamics import Integrator
+from pipeline.simulation import Integrator
 from springmass.testing import formats, integrators, laws, sensors
 from springmass.testing.formats import File
 

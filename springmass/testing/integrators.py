@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from pipeline.dynamics import INTEGRATORS, Equation, Integrator, Problem
-from pipeline.dynamics.methods import acceleration
+from pipeline.simulation import INTEGRATORS, Equation, Integrator, Problem
+from pipeline.simulation.methods import acceleration
 from springmass.testing.demands import demand
 
 _STEP_S = 0.01

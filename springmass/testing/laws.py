@@ -10,8 +10,8 @@ import numpy as np
 from pipeline.damping.law_fit import fit_law
 from pipeline.damping.laws import FunctionLaw, Law, find_law, in_units
 from pipeline.numerics.least_squares import CENTRAL_STEP, central_differences
-from pipeline.numerics.quantity import Unit
 from pipeline.track import F8
+from pipeline.units import Unit
 from springmass.testing.demands import demand
 
 _SIZES = (0.0, *(10.0**power for power in (-300, -200, -100, -20, -12, -8, -6, -5, -4, -3, -2, -1, 0, 1, 2, 3)))

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.dynamics import INTEGRATORS, Equation, Integrator, Problem, Trajectory, get_integrator
 from pipeline.errors import DynamicsError
+from pipeline.simulation import INTEGRATORS, Equation, Integrator, Problem, Trajectory, get_integrator
 from springmass.testing import check
 from tests.sampling import sampled
 

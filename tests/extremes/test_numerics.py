@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.dynamics import INTEGRATORS, Equation, Problem, get_integrator, halving, methods
-from pipeline.dynamics.halving import auto
 from pipeline.errors import DynamicsError
+from pipeline.simulation import INTEGRATORS, Equation, Problem, get_integrator, halving, methods
+from pipeline.simulation.halving import auto
 
 OMEGA = 8.66
 FREE = Equation(angular_frequency_per_s=OMEGA)

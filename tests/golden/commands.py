@@ -94,6 +94,12 @@ def _prepared(result: Any) -> Any:
         short["effects"] = [each["name"] for each in result["effects"] if each["included"]]
     if isinstance(result.get("budget"), dict):
         short["budget"] = {name: dict(_shares(each)) for name, each in result["budget"].items()}
+    if isinstance(result.get("grades"), dict):
+        short["grades"] = {
+            name: ": ".join([each["grade"], ", ".join(each["reasons"])])
+            for name, each in result["grades"].items()
+            if each["grade"] != "sound"
+        }
     damping = short.get("damping")
     if isinstance(damping, dict) and "laws" in damping:
         damping["rejected"] = [name for name, law in damping.pop("laws").items() if law["rejected"]]

@@ -11,8 +11,8 @@ import pytest
 from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.bench.disc import derive_drag
 from pipeline.bench.scene import Scene
-from pipeline.dynamics.band import spread
 from pipeline.numerics.estimate import Estimate
+from pipeline.simulation.band import spread
 from springmass.simulations.simulation import prepare
 from tests.recordings.test_real_runs import RECORDINGS, track_of
 

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from pipeline.bench.scene import Scene
-from pipeline.dynamics import get_integrator
-from pipeline.dynamics.band import draw, spread
+from pipeline.simulation import get_integrator
+from pipeline.simulation.band import draw, spread
 from springmass.simulations.simulation import prepare
 
 BENCHES = min(1000, max(200, int(os.environ.get("SPRINGMASS_TRIALS", "200"))))

@@ -51,7 +51,7 @@ def motions(
 @pytest.mark.parametrize("seconds", [10.0, 60.0])
 def test_nothing_is_found_where_nothing_is(seconds: float, law: str, rho: float) -> None:
     """At most 1 % of clean records show a mode, in white noise and in correlated."""
-    modes = sum(bool(m.disturbances.sideways) for m, _ in motions(seconds, law=law, rho=rho))
+    modes = sum(bool(m.modes.members) for m, _ in motions(seconds, law=law, rho=rho))
     assert modes <= 0.01 * TRIALS + 3.3 * math.sqrt(0.01 * 0.99 * TRIALS)
 
 
@@ -60,7 +60,7 @@ def test_nothing_is_found_where_nothing_is(seconds: float, law: str, rho: float)
 def test_what_is_there_is_found(seconds: float, rho: float) -> None:
     """A mode of 0.5 mm in 0.3 mm of noise is found in 95 % of records."""
     modes = sum(
-        any(abs(x.frequency_hz - 0.803) < 1.0 / seconds for x in m.disturbances.sideways.modes if x.kind == "mode")
+        any(abs(x.frequency_hz - 0.803) < 1.0 / seconds for x in m.modes.members if x.kind == "mode")
         for m, _ in motions(seconds, rho=rho, mode_m=5e-4)
     )
     assert modes >= 0.95 * TRIALS - 3.3 * math.sqrt(0.05 * 0.95 * TRIALS)

@@ -14,10 +14,10 @@ from pipeline.analyse import Oscillation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
 from pipeline.options import options_for
-from pipeline.results.compare import SpringRun, compare_springs
-from pipeline.results.masses import mass_line
+from pipeline.several.compare import SpringRun, compare_springs
+from pipeline.several.masses import mass_line
 from pipeline.track import Track
-from tests.unit.pipeline.results.test_compare import oscillating
+from tests.unit.pipeline.several.test_compare import oscillating
 
 U_BOB_KG = 2e-5
 LOADS = np.array([0.6, 0.8, 1.0, 1.2, 1.4])  # of five, in masses of the middle one; the spring weighs a tenth of it

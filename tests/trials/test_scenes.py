@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.dynamics import Equation, Problem
-from pipeline.dynamics.halving import auto
 from pipeline.errors import DynamicsError
+from pipeline.simulation import Equation, Problem
+from pipeline.simulation.halving import auto
 
 SCENES = min(200, int(os.environ.get("SPRINGMASS_TRIALS", "40")))
 LONGEST = 2e4 if SCENES < 200 else np.inf  # radians of a scene that is solved where time is short

@@ -13,13 +13,13 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from failure.extensions import load_named
+from pipeline.bench.law_names import GROUP, law_names
 from pipeline.damping.laws.drag import DRAGS, Drag
 from pipeline.damping.laws.law import Law, free_power, in_units, units_of, words_of
 from pipeline.damping.laws.of_function import FunctionLaw, make_law
 from pipeline.damping.laws.power import Power
 from pipeline.errors import AnalysisError
-from pipeline.numerics.quantity import Unit
-from pipeline.registry.laws import GROUP, law_names
+from pipeline.units import Unit
 
 __all__ = [
     "LAWS",

@@ -7,8 +7,8 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from pipeline.numerics.quantity import Unit
 from pipeline.track import F8
+from pipeline.units import Unit
 
 
 @runtime_checkable

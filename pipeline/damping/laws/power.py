@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.damping.laws.drag import Drag
-from pipeline.numerics.quantity import Unit
 from pipeline.track import F8
+from pipeline.units import Unit
 
 _MIXED = Drag("guess", "", (1, 2))
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.analyse import Analysis, Oscillation, Overdamped, analyse
+from pipeline.analyse import Analysis, Oscillation, Relaxation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError
 from pipeline.options import options_for
@@ -165,8 +165,8 @@ def _beginning(analysis: Analysis) -> float:
     """
     if isinstance(analysis.motion, Oscillation):
         return analysis.motion.phase.t0
-    if isinstance(analysis.motion, Overdamped):
+    if isinstance(analysis.motion, Relaxation):
         return analysis.motion.start_s
     said = any(finding.code in LEAVES_OUT for finding in analysis.findings)
-    usable = analysis.conditioned.used if said else np.isfinite(analysis.track.y)
+    usable = analysis.samples.used if said else np.isfinite(analysis.track.y)
     return float(analysis.track.t[np.flatnonzero(usable)[0]])

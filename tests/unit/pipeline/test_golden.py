@@ -13,7 +13,7 @@ import pytest
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import classic
-from pipeline.results.compare import SpringRun, compare_springs
+from pipeline.several.compare import SpringRun, compare_springs
 from pipeline.track import Track
 
 BARE = Scene.from_mapping({"bob": {"mass_kg": {"value": 0.2007, "u": 0.00005}}})

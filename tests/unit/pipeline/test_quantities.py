@@ -13,7 +13,7 @@ from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError, TrackError
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import classic
-from pipeline.results.compare import SpringRun
+from pipeline.several.compare import SpringRun
 from pipeline.track import UNITS, Track
 from tests.motion import motion_of
 from tests.sampling import sampled

@@ -109,7 +109,7 @@ def test_clipped_run() -> None:
     run = sample("clipped")
     assert run.result.estimates["amplitude"].value == pytest.approx(run.value("amplitude"), rel=0.01)
     assert "clipped" in {finding.code for finding in run.result.findings}
-    assert run.result.conditioned.plateaus_m == (pytest.approx(run.truth["clip_limit_m"], abs=2e-4),)
+    assert run.result.samples.plateaus == (pytest.approx(run.truth["clip_limit_m"], abs=2e-4),)
     assert run.share_flagged("clipped_rows", Quality.CLIPPED) >= 0.98
     assert run.result.quality["clipped"] <= 1.02 * len(run.truth["clipped_rows"])
 

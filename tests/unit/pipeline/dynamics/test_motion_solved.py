@@ -10,8 +10,8 @@ import pytest
 from pipeline.bench.disc import added_mass_kg
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import oscillating_mass_kg
-from pipeline.dynamics import Equation, Problem, effective_mass_kg, get_integrator
 from pipeline.errors import SceneError
+from pipeline.simulation import Equation, Problem, effective_mass_kg, get_integrator
 from springmass.simulations.bench import REST_M, bench_position
 from springmass.simulations.simulation import prepare
 

@@ -11,7 +11,7 @@ import pytest
 import springmass as sm
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.results.classic import classic
-from pipeline.results.compare import SpringRun, compare_springs
+from pipeline.several.compare import SpringRun, compare_springs
 from pipeline.track import F8
 from springmass.charts.chart import Chart, ChartNote, Panel, Series, decoded, line_of, to_json
 from springmass.charts.draw import render
@@ -90,7 +90,7 @@ def test_amplitude(charts: dict[str, Drawn], damped: Analysis, motion: Oscillati
     assert next(s for s in curves if s["role"] == "law")["label"] == f"{motion.damping.selected} (selected)"
     _, y = charts["amplitude"].xy("amplitude of one window")
     kept = motion.damping.scatter.kept
-    np.testing.assert_allclose(y, 1e3 * motion.demodulated.amplitude[kept], rtol=1e-6)
+    np.testing.assert_allclose(y, 1e3 * motion.windows.amplitude[kept], rtol=1e-6)
     np.testing.assert_allclose(
         decoded(charts["amplitude"].series("amplitude of one window")["u"]),
         1e3 * motion.damping.scatter.u[kept],

@@ -162,7 +162,7 @@ def test_table_1_is_ready_for_a_spreadsheet(page: str, result: dict[str, Any]) -
 
 def grades_in(page: str) -> dict[str, str]:
     """Return what Table 1 says of each quantity: may it be quoted?"""
-    row = r'<tr><th scope="row">([^<]*)</th>(?:(?!</tr>).)*<td class="trust ([a-z-]+)">'
+    row = r'<tr><th scope="row">([^<]*)</th>(?:(?!</tr>).)*<td class="grade ([a-z-]+)">'
     return dict(re.findall(row, page.partition("</table>")[0]))
 
 

@@ -1,0 +1,122 @@
+"""What all fits of an oscillation share: its phase, rest position and waveform."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pipeline.damping.select import Damping
+from pipeline.modes.mode import Modes
+from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.levels import NOTICEABLE
+from pipeline.track import F8
+from pipeline.windows.demodulate import Windows
+
+TimeTable = tuple[F8, F8]  # values at ascending times, s
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Phase:
+    """Total phase against time: a straight line, a backbone if one shows, less the lag of a period's sinusoid."""
+
+    t0: float  # time of the start, s
+    angular_frequency: Estimate  # mean over the record: the slope of a straight line through the phases
+    phase: Estimate  # at t0, wrapped into (-pi, pi]
+    backbone: Estimate | None  # kappa of omega(A) = omega + kappa A^2; None if it is not significant
+    reduced_chi2: float
+    correlation: float  # of the straight line's residuals, as a number of windows
+    residual: F8  # (w,) phases minus the straight line, rad
+    coefficients: F8  # of 1, of t - middle and, with a backbone, of the integral of A^2
+    middle: float  # weighted mean time, s
+    area: TimeTable | None = None  # integral of A^2 from the middle; with a backbone
+    lag: TimeTable | None = None  # delay of a period's sinusoid, rad; None if it is constant
+    small_swings: Estimate | None = None  # angular frequency of very small swings; with a backbone
+    squared_rate: float | None = None  # decrease of the squared frequency by drag, 1/s^2; None: that of the windows
+
+    def total(self, t: F8) -> F8:
+        """Return the total phase in rad at times t (n,)."""
+        level, slope, *bend = self.coefficients.tolist()
+        total = level + slope * (t - self.middle)
+        if self.area is not None:
+            total += bend[0] * np.interp(t, *self.area)
+        return np.asarray(total - delay(t, self.lag))
+
+    def rate(self, amplitude: F8) -> F8:
+        """Return the angular frequency in rad/s at amplitudes (n,)."""
+        bend = self.coefficients[2] if self.area is not None else 0.0
+        return np.asarray(self.coefficients[1] + bend * amplitude**2)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rest:
+    """The rest position: its mean, and a smooth curve through the windows that counts if it ``drifts``."""
+
+    mean: Estimate
+    drift: float  # peak-to-peak range of the curve
+    drifts: bool  # whether the curve fits much better than a constant
+    t: F8  # (w,) centres of the windows, s
+    curve: F8  # (w,) m
+
+    def at(self, t: F8) -> F8:
+        """Return the rest position in m at times t (n,)."""
+        return np.interp(t, self.t, self.curve) if self.drifts else np.full(t.size, self.mean.value)
+
+
+@dataclass(frozen=True, eq=False)
+class Waveform:
+    """The fitted motion at every sample; its residual contains everything that the model does not describe."""
+
+    position: F8  # (n,) m
+    moving: Callable[[], F8]
+    residual: F8  # (n,) distance minus position, NaN where none was measured
+    rms: float  # root mean square of the residual over the samples used
+
+    @cached_property
+    def velocity(self) -> F8:
+        """Velocity of the oscillation (n,) in m/s, calculated on first use, as only figures need it."""
+        return self.moving()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fitted:
+    """An oscillation in the form that the stages after the fit use."""
+
+    windows: Windows  # the windows, with the final flags
+    modes: Modes  # other oscillations, which may have been subtracted before the fit
+    damping: Damping
+    phase: Phase
+    rest: Rest
+    waveform: Waveform  # including the modes
+    method: str  # "windows", "samples" or "equation"
+    why: str  # what a method that failed, or the equation of motion, came to
+
+    def first_shift(self, kappa: float) -> tuple[float, float]:
+        """Return the first amplitude, and the shift of the frequency from very small swings to it, over the frequency.
+
+        A large shift that the first windows do not show to half its size does not grow with the square of the
+        amplitude; then it is theirs, at their mean amplitude.
+        """
+        windows, omega, small = self.windows, self.phase.angular_frequency.value, self.phase.small_swings
+        start = self.damping.best.joint["A0"].value
+        shift, last = kappa * start**2 / omega, max(2, windows.t.size // 20)
+        if small is None or abs(shift) < NOTICEABLE or last >= windows.t.size:
+            return start, shift
+        mean = float(np.mean(windows.amplitude[: last + 1]))
+        turned, passed = (float(each[last] - each[0]) for each in (windows.phase, windows.t))
+        shown = turned / passed / small.value - 1.0
+        return (mean, shown) if abs(shown) < 0.5 * abs(kappa) * mean**2 / omega else (start, shift)
+
+
+def delay(t: F8, lag: TimeTable | None) -> F8 | float:
+    """Return the delay of a period's sinusoid at times t (n,), rad."""
+    return 0.0 if lag is None else np.interp(t, *lag)
+
+
+def wrapped(angle: float) -> float:
+    """Return the angle in rad wrapped into (-pi, pi]."""
+    turned = math.remainder(angle, 2.0 * math.pi)
+    return math.pi if turned == -math.pi else turned

@@ -1,0 +1,403 @@
+"""Relaxation motion: records in which damping ends the motion before it completes more than a few cycles.
+
+The model is the free motion of a linearly damped bob at any strength of damping,
+:math:`\\ddot x + 2g\\dot x + w x = 0` about a rest position o, from x = a with velocity v. Its parameters are
+(o, a, v, ln g, ln w), so that g and w remain positive. With strong damping only w/2g is determined, and in these
+parameters the resulting valley of chi-square is straight. With :math:`q = s^2 = g^2 - w` the motion is
+:math:`e^{-gt}(a\\cosh st + (v + ga)\\sinh(st)/s)`: it oscillates for q < 0, is critically damped for q = 0 and has the
+two rates :math:`g \\mp \\sqrt q` for q > 0.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from pipeline.bench.disc import added_mass_kg
+from pipeline.bench.instrument import U_CRYSTAL
+from pipeline.bench.scene import Scene
+from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
+from pipeline.motion.fit import Rows
+from pipeline.numerics import least_squares
+from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.least_squares import CENTRAL_STEP, Fit
+from pipeline.numerics.levels import FEWEST_FOR_CURVE, MISFIT, STRONG, VERY_STRONG
+from pipeline.numerics.regression import covariance_of
+from pipeline.samples.condition import Samples
+from pipeline.track import F8, Track
+from pipeline.units import noun
+from pipeline.windows.cycles import NoOscillation
+
+LARGEST_CHANGE = 20.0  # maximum change of the logarithm of a rate in the fit of a single exponential
+
+Shape = Callable[[F8, F8], F8]
+
+
+@dataclass(frozen=True, slots=True)
+class Relaxing:
+    """A model that is linear in its first parameters; the others are logarithms of rates."""
+
+    shape: Shape  # columns (n, k) of the linear parameters at times (n,), for the logarithms
+    linear: int
+
+    def at(self, t: F8, values: F8) -> tuple[F8, Callable[[], F8]]:
+        """Return the positions (n,) at t, and a function that gives their derivatives (n, p)."""
+        linear, logarithms = values[: self.linear], values[self.linear :]
+        columns = self.shape(t, logarithms)
+
+        def slopes() -> F8:
+            moved = [
+                (self.shape(t, logarithms + step) - self.shape(t, logarithms - step)) @ linear / (2.0 * CENTRAL_STEP)
+                for step in CENTRAL_STEP * np.eye(logarithms.size)
+            ]
+            return np.column_stack([columns, *moved])
+
+        return columns @ linear, slopes
+
+    def fit(self, rows: Rows, logarithms: F8) -> Fit:
+        """Fit the logarithms to the residuals that remain with the best linear parameters.
+
+        In the valley of strong damping a search among all parameters does not reach the minimum.
+        """
+
+        def residuals(at: F8) -> F8:
+            columns = self.shape(rows.t, at)
+            if not np.all(np.isfinite(columns)):
+                return np.full(rows.t.size, np.nan)
+            base = np.linalg.qr(columns)[0]
+            return np.asarray((rows.y - base @ (base.T @ rows.y)) / rows.u)
+
+        end = least_squares.minimise(residuals, logarithms)
+        columns = np.nan_to_num(self.shape(rows.t, end.values))
+        return replace(end, values=np.concatenate([np.linalg.lstsq(columns, rows.y, rcond=None)[0], end.values]))
+
+
+def exponential(t: F8, logarithms: F8) -> F8:
+    """Return the columns (n, 2) of a constant and a single exponential for the parameter (ln r,)."""
+    with np.errstate(all="ignore"):
+        return np.stack([np.ones(t.size), np.exp(-np.exp(logarithms[0]) * t)], axis=1)
+
+
+def damped(t: F8, logarithms: F8) -> F8:
+    """Return the columns (n, 3) of (o, a, v) for (ln g, ln w), or (ln g,) with critical damping.
+
+    For positive q both functions are sums of two decaying exponentials, so that nothing overflows. For negative q
+    they are replaced by cosine and sine. For small arguments :math:`\\sinh(st)/s` is :math:`t + q t^3/6`.
+    """
+    with np.errstate(all="ignore"):
+        rate = np.exp(logarithms[0])
+        stiffness = np.exp(logarithms[1]) if logarithms.size == 2 else rate**2
+        square = rate**2 - stiffness
+        root = np.sqrt(abs(square))
+        if square > 0.0:
+            # Computing g - sqrt(q) would lose digits.
+            slow, fast = np.exp(-stiffness / (rate + root) * t), np.exp(-(rate + root) * t)
+            cosine, sine = 0.5 * (slow + fast), 0.5 * (slow - fast)
+        else:
+            fall = np.exp(-rate * t)
+            cosine, sine = fall * np.cos(root * t), fall * np.sin(root * t)
+        near = np.exp(-rate * t) * t * (1.0 + square * t * t / 6.0)
+        sine = np.where(root * t < 1e-4, near, sine / root)
+    return np.stack([np.ones(t.size), cosine + rate * sine, sine], axis=1)
+
+
+DAMPED = Relaxing(damped, 3)
+LONE = Relaxing(exponential, 2)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Decay:
+    """A fit of the motion: with critical damping, w = g^2, there are four parameters, without ln w."""
+
+    values: F8
+    covariance: F8
+    chi2: float
+
+    @property
+    def critical(self) -> bool:
+        """Whether the fit assumes critical damping."""
+        return self.values.size == 4
+
+    @property
+    def rate(self) -> float:
+        """The damping rate g, 1/s."""
+        return math.exp(self.values[3])
+
+    @property
+    def stiffness(self) -> float:
+        """The square w of the undamped angular frequency, rad^2/s^2."""
+        return self.rate**2 if self.critical else math.exp(self.values[4])
+
+    @property
+    def square(self) -> float:
+        """The difference q = g^2 - w, 1/s^2."""
+        return self.rate**2 - self.stiffness
+
+    @property
+    def slowest(self) -> float:
+        """The rate at which the motion ends, 1/s; the slower one if there are two."""
+        # Computing g - sqrt(q) would lose digits.
+        return self.stiffness / (self.rate + math.sqrt(self.square)) if self.square > 0.0 else self.rate
+
+
+def best_decay(rows: Rows, rate_hz: float) -> Decay | None:
+    """Return the best of the fits from a grid of start values; None if no fit converged."""
+    ends = [DAMPED.fit(rows, start) for start in _grid(rows, rate_hz)]
+    # If the record determines only one of two rates, chi-square has an open valley, possibly with a minimum beside it.
+    minima = [end for end in ends if end.converged]
+    return _described(DAMPED, rows, min(minima, key=lambda end: end.cost)) if minima else None
+
+
+def critical_decay(rows: Rows, near: Decay) -> Decay | None:
+    """Return the critically damped fit started from another fit; None if it did not converge."""
+    end = DAMPED.fit(rows, near.values[3:4])
+    return _described(DAMPED, rows, end) if end.converged else None
+
+
+def lone_exponential(rows: Rows, rate: float) -> tuple[float, float]:
+    """Fit :math:`o + p e^{-rt}` from a start value of the rate (in 1/s), and return r and chi-square.
+
+    If the record shows no such rate the search diverges; r is limited to a factor of :data:`LARGEST_CHANGE`.
+    """
+    start = math.log(rate)
+    end = LONE.fit(rows, np.array([start]))
+    return math.exp(min(max(float(end.values[-1]), start - LARGEST_CHANGE), start + LARGEST_CHANGE)), end.cost
+
+
+def _described(model: Relaxing, rows: Rows, end: Fit) -> Decay:
+    return Decay(end.values, covariance_of(rows.residuals(model)(end.values)[1]()), end.cost)
+
+
+def _grid(rows: Rows, rate_hz: float) -> F8:
+    """Return start values (k, 2) of (ln g, ln w): the best oscillations, pairs of close rates and of distinct rates.
+
+    The grid is evaluated on samples that are thinned with time, each weighted by the number of samples it represents.
+    In pairs of distinct rates the slower rate is that of the single exponential fitted to the record, because there
+    may be a minimum beside the valley of chi-square.
+    """
+    tau, y = rows.t, rows.y
+    few = np.unique(np.concatenate([np.arange(min(60, tau.size)), np.geomspace(1, tau.size, 240).astype(int) - 1]))
+    share = np.sqrt(np.gradient(few.astype(np.float64)))[:, None]
+
+    def best(shape: Shape, logarithms: F8, keep: int = 2) -> F8:
+        base = np.linalg.qr(np.array([shape(tau[few], each) * share for each in logarithms]))[0]
+        explained = np.sum((base.transpose(0, 2, 1) @ (y[few] * share[:, 0])) ** 2, axis=1)
+        return np.asarray(logarithms[np.argsort(-explained)[:keep]])
+
+    rates = np.geomspace(1.0 / tau[-1], 0.5 * rate_hz, 24)
+    ((start,),) = best(exponential, np.log(rates)[:, None], 1)
+    slow, _ = lone_exponential(rows, math.exp(start))
+    fast = np.geomspace(1.5 * slow, max(rate_hz, 3.0 * slow), 24)
+    near = np.array([(g, g * g * (1.0 - x)) for g in rates for x in (0.04, 0.3)])
+    turning = np.array([(g, g * g * (1.0 + x * x)) for g in rates for x in (0.4, 1.0, 2.0, 4.0, 8.0, 16.0)])
+    apart = np.stack([0.5 * (slow + fast), slow * fast], axis=1)
+    return np.concatenate([best(damped, np.log(kind)) for kind in (apart, near, turning)])
+
+
+DampingKind = Literal["overdamped", "critical", "strong"]
+
+# Approximate number of block means to which a record is reduced before shapes are compared; all shapes then take 7 ms,
+# as measured.
+BLOCK_MEANS = 300
+# Minimum damping ratio zeta of a strongly damped oscillation; below it the cycles are analysed instead.
+LEAST_DAMPING = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Relaxation:
+    """A motion that relaxes with two rates or with one, or an oscillation whose damping ratio is large."""
+
+    why: str  # one sentence that states the rates or the damping ratio
+    kind: DampingKind
+    damping_ratio: Estimate  # g/omega0
+    squared_frequency: Estimate  # omega0^2; multiplied by the mass it is the spring constant
+    estimates: Mapping[str, Estimate]
+    start_s: float  # time at which the fitted part of the motion begins
+
+
+def find_relaxation(samples: Samples) -> Relaxation | NoOscillation | None:
+    """Fit the free motion of a linearly damped bob and classify its damping.
+
+    The result is :class:`NoOscillation` if the record is a single exponential, which a drift can resemble. It is None
+    if the record is no relaxation but noise, a drift, a step, a ramp or a weakly damped oscillation.
+
+    A relaxation must leave no more than noise, also in its moving part alone, and end within the record (:math:`gT >
+    2`). The evidence for it against every polynomial up to degree three, every step and every ramp must be very strong,
+    and that against a single exponential strong. Critical damping and the free fit are compared by BIC. If a record
+    begins before the release, the fit begins where the displacement begins to fall.
+    """
+    used = samples.used
+    t, y = samples.track.t[used], samples.track.y[used]
+    if t.size < 2 * FEWEST_FOR_CURVE:
+        return None
+    noise = max(samples.noise, (samples.quantum or 0.0) / math.sqrt(12.0), 1e-4 * float(np.ptp(y)))
+    if not (noise > 0.0 and _moves(y, noise)):
+        return None
+    for first in _starts(y, noise):
+        found = _follow(t[first:], y[first:], noise, samples)
+        if found is not None:
+            return found
+    return None
+
+
+def _moves(y: F8, noise: float) -> bool:
+    """Return whether block means of the record vary enough for a relaxation to explain the variation."""
+    size = max(1, y.size // BLOCK_MEANS)
+    values = y[: y.size // size * size].reshape(-1, size).mean(axis=1)
+    excess = float(np.sum((values - values.mean()) ** 2)) * size / noise**2 - values.size
+    return bool(excess > VERY_STRONG + 5.0 * math.log(values.size))
+
+
+def _starts(y: F8, noise: float) -> Iterator[int]:
+    """Yield the rows at which the motion may begin: the first sample, then the release of a held displacement."""
+    yield 0
+    rest = float(np.median(y[-max(y.size // 10, 5) :]))
+    away = np.abs(y - rest)
+    held = np.flatnonzero(away >= float(np.median(away[: max(y.size // 50, 5)])) - 3.0 * noise)
+    if held.size and 5 < held[-1] < y.size - 20:
+        yield int(held[-1])
+
+
+def _follow(t: F8, y: F8, noise: float, samples: Samples) -> Relaxation | NoOscillation | None:
+    every = np.ones(t.size, np.bool_)
+    rows, track = Rows(t - t[0], y, every, every, noise), samples.track
+    found = best_decay(rows, track.rate_hz)
+    if found is None or not found.rate * rows.t[-1] > 2.0 or _misses(rows, found):
+        return None
+    if not _beats_other_shapes(rows, found):
+        return None
+    choice = _kind(rows, found, 0.5 * track.rate_hz, track.unit)
+    if choice is None or isinstance(choice, NoOscillation):
+        return choice
+    kind, found = choice
+    # A residual larger than the noise increases the uncertainties.
+    found = replace(found, covariance=found.covariance * max(1.0, found.chi2 / max(t.size - 5, 1)))
+    spread = math.sqrt(found.chi2 / max(t.size - 5, 1)) * noise
+    noise_found = Estimate(spread, spread / math.sqrt(2.0 * t.size), track.unit)
+    result = _classified(found, kind, float(t[0]), noise_found, track)
+    return None if kind == "strong" and result.damping_ratio.value < LEAST_DAMPING else result
+
+
+def _misses(rows: Rows, found: Decay) -> bool:
+    """Return whether the residual is too large over the whole record or over its moving part."""
+    squares = (rows.left(DAMPED, found.values) / rows.u) ** 2
+    count = max(int(np.searchsorted(rows.t, 4.0 / found.slowest)), 12)
+    return bool(max(float(np.mean(squares)), float(np.mean(squares[:count]))) > MISFIT**2)
+
+
+def _beats_other_shapes(rows: Rows, found: Decay) -> bool:
+    """Return whether the relaxation explains the record better than any polynomial, step or ramp does."""
+    size = max(1, rows.t.size // BLOCK_MEANS)
+    whole = rows.t.size // size * size
+    each = (rows.t, rows.y, rows.left(DAMPED, found.values))
+    t, values, left = (x[:whole].reshape(-1, size).mean(axis=1) for x in each)
+    sigma = rows.u / math.sqrt(size)
+    mine = float(np.sum(left**2)) / sigma**2 + 5.0 * math.log(t.size)
+    others = min(left / sigma**2 + count * math.log(t.size) for left, count in _other_shapes(t, values))
+    return mine + VERY_STRONG < others
+
+
+def _other_shapes(t: F8, y: F8) -> Iterator[tuple[float, int]]:
+    """Yield squared residuals and number of parameters of polynomials up to degree three, the best step, and ramps."""
+    x = 2.0 * t / t[-1] - 1.0
+    for degree in range(4):
+        yield _left(np.polynomial.legendre.legvander(x, degree), y), degree + 1
+    n = t.size
+    splits = np.arange(3, n - 3)
+    total, squares = np.cumsum(y), float(y @ y)
+    before, after = total[splits - 1] ** 2 / splits, (total[-1] - total[splits - 1]) ** 2 / (n - splits)
+    yield squares - float(np.max(before + after)), 3
+    knots = np.linspace(t[0], t[-1], 26)
+    for i, first in enumerate(knots[:-1]):
+        for last in knots[i + 1 :]:
+            ramp = np.clip((t - first) / (last - first), 0.0, 1.0)
+            yield _left(np.stack([np.ones(n), ramp], axis=1), y), 4
+
+
+def _left(design: F8, y: F8) -> float:
+    values = np.linalg.lstsq(design, y, rcond=None)[0]
+    residual: F8 = y - design @ values
+    return float(np.sum(residual**2))
+
+
+def _kind(rows: Rows, fit: Decay, fastest: float, unit: str) -> tuple[DampingKind, Decay] | NoOscillation | None:
+    """Return the kind of damping with the lowest BIC and its fit, unless a single exponential suffices.
+
+    None if the motion ends at a rate above ``fastest`` (in 1/s), that is between two samples, like a step.
+    """
+    price = math.log(rows.t.size)
+    rate, left = lone_exponential(rows, fit.slowest)
+    one = critical_decay(rows, fit)
+    critical = math.inf if one is None else one.chi2 + 4.0 * price
+    free = fit.chi2 + 5.0 * price
+    if min(critical, free) > left + 3.0 * price - STRONG:
+        if rate > fastest:
+            return None
+        return NoOscillation(
+            f"the {noun(unit)} follows one exponential, at {rate:.3g} 1/s: a drift or an overdamped motion"
+        )
+    if one is not None and critical <= free:
+        return ("critical", one) if one.rate <= fastest else None
+    if fit.slowest > fastest:
+        return None
+    return ("overdamped" if fit.square > 0.0 else "strong"), fit
+
+
+def _classified(fit: Decay, kind: DampingKind, start_s: float, noise: Estimate, track: Track) -> Relaxation:
+    from uncertainties import correlated_values, ufloat, umath
+
+    unit = track.unit
+    clock = ufloat(1.0, math.hypot(U_CRYSTAL, track.u_rate))  # the tolerance of a crystal is assumed for every clock
+    offset, a, v, *logarithms = correlated_values(fit.values, fit.covariance)
+    v, rate = v * clock, umath.exp(logarithms[0]) * clock
+    stiffness = rate**2 if fit.critical else umath.exp(logarithms[1]) * clock**2
+    found = {"offset": _estimate(offset, unit), "noise": noise}
+    squared, natural = _estimate(stiffness, "rad^2/s^2"), umath.sqrt(stiffness)
+    ratio = Estimate(1.0, 0.0) if kind == "critical" else _estimate(rate / natural, "")
+    if kind == "critical":
+        found["relaxation_rate"] = _estimate(rate, "1/s")
+        why = (
+            f"the motion relaxes without oscillating, at {found['relaxation_rate']}: "
+            "within its noise it is critically damped, with one rate"
+        )
+    elif kind == "overdamped":
+        fast = rate + umath.sqrt(rate**2 - stiffness)
+        # Computing the slow rate as rate - sqrt(rate**2 - stiffness) would lose digits.
+        found["relaxation_rate_slow"] = _estimate(stiffness / fast, "1/s")
+        found["relaxation_rate_fast"] = _estimate(fast, "1/s")
+        slow, fast = found["relaxation_rate_slow"], found["relaxation_rate_fast"]
+        why = f"the motion is overdamped: it relaxes without oscillating, at {slow} and {fast}"
+    else:
+        # The oscillation is a cosine of amplitude a plus a sine of amplitude (v + g a) / omega.
+        omega = umath.sqrt(stiffness - rate**2)
+        side = (v + rate * a) / omega
+        turn = 2.0 * math.pi
+        found["angular_frequency"] = _estimate(omega, "rad/s")
+        found["frequency"] = _estimate(omega / turn, "Hz")
+        found["period"] = _estimate(turn / omega, "s")
+        found["amplitude"] = _estimate(umath.sqrt(a**2 + side**2), unit)
+        found["phase"] = _estimate(umath.atan2(-side, a), "rad")
+        found["damping_rate"] = _estimate(rate, "1/s")
+        found["quality_factor"] = _estimate(0.5 * natural / rate, "")
+        why = f"the oscillation is strongly damped: its damping ratio is {ratio}"
+    return Relaxation(why, kind, ratio, squared, found, start_s)
+
+
+def _estimate(quantity: Any, unit: str) -> Estimate:
+    return Estimate(quantity.nominal_value, quantity.std_dev, unit)
+
+
+def spring_constant(found: Relaxation, scene: Scene) -> dict[str, Estimate]:
+    """Return :math:`k = \\omega_0^2 M` in N/m by name, M being the oscillating mass; empty without a bob's mass."""
+    if scene.bob_mass_kg is None:
+        return {}
+    spring = scene.spring_mass_kg or unstated_spring_kg(scene.bob_mass_kg.value)
+    mass = oscillating_mass_kg(spring.value, scene.bob_mass_kg.value + added_mass_kg(scene))
+    u_mass = math.hypot(scene.bob_mass_kg.u, spring.u / 3.0)
+    k = found.squared_frequency.value * mass
+    relative = math.hypot(u_mass / mass, found.squared_frequency.u / found.squared_frequency.value)
+    return {"spring_constant": Estimate(k, k * relative, "N/m")}
