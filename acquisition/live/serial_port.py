@@ -25,6 +25,8 @@ except ImportError:  # on Windows, where the use of a port is always exclusive
     _TERMIOS_ERRORS = ()
 
 READ_BYTES = 65536
+EMPTY_READS = 3
+"""Number of reads without a byte, though some were announced, that show another reader."""
 SEVEN_BITS = bytes(byte & 0x7F for byte in range(256))
 KEEPALIVE_S = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 2, "TCP_KEEPCNT": 3}
 """A silently lost connection is closed after five seconds without data and three probes, two seconds apart."""
@@ -49,6 +51,7 @@ class SerialPort:
 
     def __init__(self, address: str, baud: int, framing: str = "8N1") -> None:
         self.name = address
+        self._empty_reads = 0
         self.shared = False  # whether another program took bytes since a reader set this to False
         self._baud = baud
         self._framing = framing
@@ -134,13 +137,17 @@ class SerialPort:
                 return bytes(data + self._port.read(min(self._port.in_waiting, READ_BYTES))) if data else b""
             if not select.select([self._descriptor], [], [], wait_s)[0]:
                 return b""
+            terminal, data = os.isatty(self._descriptor), b""
             try:
                 data = os.read(self._descriptor, READ_BYTES)
             except BlockingIOError:
-                return b""
-            if not data and (not os.isatty(self._descriptor) or _hung_up(self._descriptor)):
+                if not terminal:
+                    return b""
+            if not data and (not terminal or _hung_up(self._descriptor)):
                 raise OSError("end of file")
-            self.shared |= not data  # a terminal had bytes, and another program was faster
+            if not data:  # a terminal had bytes, and another program was faster, or select was wrong, which is rare
+                self._empty_reads += 1
+                self.shared |= self._empty_reads >= EMPTY_READS
             return data
 
     def write(self, data: bytes) -> None:

@@ -222,6 +222,8 @@ class Tee:
             self._kept = None
             self._recorder, self._chains, self._parts = recorder, chains, not preview
             self._channels, self._begun = list(range(len(chains))), {port for port, _, _ in kept}
+            for port in sorted(self.shared):  # it was noticed before the run began
+                recorder.event(port, since_ns, Shared(port=self._sensors[port].port.name))
             recorder.reads(kept)
             for read in kept:
                 self._decode(read[0], read)
