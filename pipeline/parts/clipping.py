@@ -79,7 +79,7 @@ def find_clipping(samples: Samples, cycles: Cycles, windows: Windows) -> Samples
     """
     # A record whose crests are flat may show no noise at all.
     rounding = ROUNDING * float(np.max(np.abs(windows.amplitude)))
-    least_noise = max(samples.noise, (samples.quantum or 0.0) / math.sqrt(12.0), rounding)
+    least_noise = max(samples.noise_of_reading, rounding)
     unexplained = _of_windows(WindowSamples.sliced(samples, cycles.bounds), windows)
     if not any(_clipped_windows(unexplained, sign, least_noise) for sign in (1.0, -1.0)):
         return None

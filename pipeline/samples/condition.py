@@ -70,6 +70,11 @@ class Samples:
         mask: NDArray[np.bool_] = (self.flags & UNUSABLE) == 0
         return mask
 
+    @property
+    def noise_of_reading(self) -> float:
+        """The noise of one sample, at least that of rounding to the resolution, in the record's unit."""
+        return max(self.noise, (self.quantum or 0.0) / math.sqrt(12.0))
+
     def less(self, taken: F8) -> Samples:
         """Return the record with values (n,) subtracted from its distances; flags and times are kept."""
         return replace(self, track=replace(self.track, y=self.track.y - taken))
