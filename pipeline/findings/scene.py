@@ -28,7 +28,7 @@ def scene_findings(scene: Scene, effects: tuple[Effect, ...], *, constant: bool 
     }
     exact = [name for name, estimate in used.items() if estimate is not None and estimate.u == 0]
     if unusual := scene.unusual():
-        said = [clause if clause.endswith("?") else f"{clause}." for clause in unusual]
+        said = [f"{clause}{mark or '.'}" for clause, mark in unusual]
         yield Notice("scene_implausible", {"first": said[0], "more": len(said) - 1 or None, "all": " ".join(said)})
     if constant and scene.bob_mass_kg is not None and scene.spring_mass_kg is None:
         yield Notice("spring_mass_missing", {"heaviest": HEAVIEST_SHARE})

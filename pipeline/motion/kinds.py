@@ -16,7 +16,7 @@ from pipeline.motion.relaxation import LEAST_DAMPING, Relaxation, find_relaxatio
 from pipeline.motion.two_modes import WEAKER, TwoModes, find_two_modes
 from pipeline.options import Options
 from pipeline.parts.part import Part, check_sinusoid, start_of
-from pipeline.samples.condition import Samples
+from pipeline.samples.condition import COARSE, Samples
 from pipeline.windows.cycles import NoOscillation
 from pipeline.windows.demodulate import Windows
 from pipeline.windows.rounding import rounded
@@ -37,8 +37,8 @@ def fit_motion(part: Part, options: Options) -> FittedMotion:
         return _without_cycles(samples, bent)
     windows, modes = separate(samples, cycles, windows, sought=options.modes)
     windows = rounded(windows, samples.quantum)
-    start_s = start_of(samples, windows.angular_frequency)
-    laws = fit_laws(windows, start_s, options.laws, options.known_law, samples.track.unit)
+    start_s, coarse = start_of(samples, windows.angular_frequency), (samples.quantum or 0.0) > COARSE * windows.noise
+    laws = fit_laws(windows, start_s, options.laws, options.known_law, samples.track.unit, coarse=coarse)
     solved = fit_equation(samples, windows, laws, stopped=part.stopped)
     fitted = solved if isinstance(solved, Fitted) else _averaged(windows, modes, laws, samples, options)
     if isinstance(solved, str):

@@ -261,7 +261,7 @@ def find_relaxation(samples: Samples) -> Relaxation | NoOscillation | None:
     t, y = samples.track.t[used], samples.track.y[used]
     if t.size < 2 * FEWEST_FOR_CURVE:
         return None
-    noise = max(samples.noise, (samples.quantum or 0.0) / math.sqrt(12.0), 1e-4 * float(np.ptp(y)))
+    noise = max(samples.noise_of_reading, 1e-4 * float(np.ptp(y)))
     if not (noise > 0.0 and _moves(y, noise)):
         return None
     for first in _starts(y, noise):

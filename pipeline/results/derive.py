@@ -20,6 +20,7 @@ from pipeline.damping.average import Weighted, average_over_laws, scaled
 from pipeline.damping.law_fit import LawFit, mean_squared_rate
 from pipeline.damping.laws import Drag, Law, free_power
 from pipeline.damping.laws.drag import COEFFICIENTS
+from pipeline.damping.local import local_decay
 from pipeline.damping.select import Damping
 from pipeline.motion.at_rest import Rest
 from pipeline.motion.fitted import Fitted, Phase
@@ -122,25 +123,17 @@ class Derived:
 
 
 def derive(
-    track: Track, motion: FittedMotion, scene: Scene, effects: tuple[Effect, ...], misfits: tuple[Misfit, ...] = ()
+    track: Track, motion: FittedMotion, scene: Scene, effects: tuple[Effect, ...], misfits: tuple[Misfit, ...]
 ) -> Derived:
-    """Calculate all results of a run and propagate their uncertainties.
+    """Calculate the results of a run by :mod:`pipeline.results.formulas`, and propagate their uncertainties.
 
     Results that depend on values missing in the scene are left out; the effects table says which masses are included.
     Misfits are inputs of kind B with the mean zero. Uncertainties are propagated to first order (JCGM 100:2008) by the
     ``uncertainties`` package, with one variable for each input. The clock's rate r and the scale s of the distances are
     uncertain: :math:`\\omega = r\\omega_r`, :math:`A_0 = s a_0` and :math:`\\beta = r b/s`, each from the record.
 
-    The spring constant is :math:`k = (\\omega^2 + \\overline{\\lambda^2}) m_s/x^2` with :math:`x \\tan x = m_s/(m +
-    m_a)`, the quality factor :math:`Q = \\omega_0/2\\lambda` with :math:`\\lambda = -\\dot A/A` at the start. It is
-    exact for linear drag; for other laws it is :math:`2\\pi` times the energy over the loss in a period, to first order
-    in the damping. The drag coefficient is :math:`C = 3\\pi m \\beta/(2 \\omega \\rho S)` (K. Lelas, R. Pezer,
-    arXiv:2502.07458).
-
-    If an acceleration of amplitude a is recorded, the amplitude of the displacement is :math:`a/(\\omega^2 +
-    \\lambda^2)`; for a velocity it is :math:`v/\\sqrt{\\omega^2 + \\lambda^2}`, and that of an angle follows from its
-    rate alike. For angles, voltages, forces and numbers, results that need a length are left out. The spring constant
-    needs none.
+    The quality factor is exact for linear drag; for other laws it is :math:`2\\pi` times the energy over the loss in a
+    period, to first order in the damping. The drag coefficient is that of K. Lelas, R. Pezer, arXiv:2502.07458.
 
     Results that depend on the damping law are averages over laws (:func:`pipeline.damping.average.average_over_laws`):
     :math:`x = \\sum_i w_i x_i` and :math:`u^2 = \\sum_i w_i (u_i^2 + (x_i - x)^2)`.
@@ -389,6 +382,13 @@ class _Laws:
             joint = Joint(("amplitude", "damping_rate", "displacement"), np.zeros(3), covariance, ("m", "1/s", "m"))
             quantities = quantities + np.array(inputs.add_joint("choice_of_law", joint, "A"))
         self.start, self.rate_at_start, self.root_mean_square = quantities.tolist()
+        if damping.by_statement or damping.admissible:
+            return
+        expected = self.stated.amplitude(elapsed)
+        local = local_decay(elapsed, windows.amplitude, expected, damping.scatter, best.joint.units[0])
+        if local is not None:
+            self.values = np.array([*local.values, self.values[2]])
+            self.start, self.rate_at_start = inputs.add_joint("local_decay", local, "A")
 
     def coefficients(self, rate: Any, scale: Any, lam: Any, start: Any) -> dict[str, tuple[Any, str]]:
         """Return the coefficients of the law of the results, in true seconds and metres.

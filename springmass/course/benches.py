@@ -49,7 +49,7 @@ def compare_rows(rows: Sequence[Mapping[str, Any]]) -> CourseComparison:
     moving = [row for row in rows if row["status"] == "ok"]
     if len(moving) < 2:
         raise ProgramError(
-            f"compare needs two runs with a period, got {len(moving)}", "name a larger course", exit_code=UNREADABLE
+            f"compare needs two runs with a period, got {len(moving)}", "name a larger course", UNREADABLE
         )
     by = next(name for name in BENCHES if any(name in row for row in moving))
     courses = {row[COURSE] for row in moving}
@@ -120,7 +120,7 @@ def _run(row: Mapping[str, Any], bench: str, *, alone: bool) -> CourseRun:
         unit=row.get("unit") or "",
         on_spring=on_spring,
         spring_mass_kg=spring,
-        implausible="; ".join(Scene(bob_mass_kg=bob).unusual()),
+        implausible="; ".join(f"{clause}{mark}" for clause, mark in Scene(bob_mass_kg=bob).unusual()),
     )
 
 

@@ -102,5 +102,5 @@ def ask_about(scene: Scene, where: str | Path) -> None:
 
     This is for recordings and simulations, where no finding reports such values.
     """
-    for clause in scene.unusual():
-        LOG.warning(f"{where}: {clause}; check value and unit")
+    for clause, mark in scene.unusual():
+        LOG.warning(f"{where}: {clause}{mark}; check value and unit")
