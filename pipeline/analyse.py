@@ -91,7 +91,7 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
     findings = worded(
         track.unit,
         # A missing or wrong mass changes the spring constant more than anything that the recording shows.
-        scene_findings(scene, effects, constant="spring_constant" in derived.estimates),
+        scene_findings(scene, effects, derived.estimates),
         part_findings(part.partition, float(track.t[0]), float(track.t[-1])),
         motion_findings(part.cycles, fitted),
         damping_findings(fitted.damping),

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from pipeline.bench.air import saturation_pressure
 from pipeline.bench.law_names import law_names
+from pipeline.bench.typed import typed
 from pipeline.errors import SceneError
 from pipeline.numerics.estimate import Estimate
 
-Stated: TypeAlias = Estimate | float | tuple[float, float] | None
-"""What a scene takes for a quantity: a number, or a pair (value, u), besides an estimate."""
+Stated: TypeAlias = Estimate | float | str | tuple[float, float] | None
+"""What a scene takes for a quantity: a number, a pair (value, u), or a text with its unit, besides an estimate."""
 POSITIONS = ("below", "above")
 _CHOICES: dict[tuple[str, str], tuple[str, Callable[[], tuple[str, ...]]]] = {
     ("sensor", "position"): ("sensor_position", lambda: POSITIONS),
@@ -22,7 +23,7 @@ _CHOICES: dict[tuple[str, str], tuple[str, Callable[[], tuple[str, ...]]]] = {
 """Keys of a scene file with text values: the attribute for each key, and what returns the allowed texts."""
 
 
-class _Quantity(NamedTuple):
+class Quantity(NamedTuple):
     """One key of a scene file: its attribute, its unit, and its allowed range, including both ends.
 
     The ends lie far beyond any bench. The calculations are known to be valid between them, so every allowed value gives
@@ -42,29 +43,27 @@ class _Quantity(NamedTuple):
         return f"at least {self.least:g}{unit} and at most {self.greatest:g}"
 
 
-USUAL_BOB_KG = (1e-3, 20.0)  # a bob of a bench; a mass beyond is probably in grams
-
-_QUANTITIES: dict[tuple[str, str], _Quantity] = {
-    ("bob", "mass_kg"): _Quantity("bob_mass_kg", "kg", 1e-12, 1e6),
-    ("spring", "mass_kg"): _Quantity("spring_mass_kg", "kg", 0.0, 1e6),
-    ("spring", "constant_n_per_m"): _Quantity("spring_constant_n_per_m", "N/m", 1e-12, 1e12),
-    ("spring", "cubic_n_per_m3"): _Quantity("spring_cubic_n_per_m3", "N/m3", -1e18, 1e18),
-    ("pendulum", "length_m"): _Quantity("pendulum_length_m", "m", 1e-4, 1e4),
-    ("disc", "diameter_m"): _Quantity("disc_diameter_m", "m", 1e-6, 1e3),
-    ("air", "temperature_c"): _Quantity("air_temperature_c", "degC", -100.0, 200.0),
-    ("air", "pressure_pa"): _Quantity("air_pressure_pa", "Pa", 1e-3, 1e7),
-    ("air", "relative_humidity"): _Quantity("air_relative_humidity", "", 0.0, 1.0),
-    ("sensor", "sigma_m"): _Quantity("sensor_sigma_m", "m", 1e-12, 1e3),
-    ("sensor", "mean_samples"): _Quantity("sensor_mean_samples", "", 1.0, 1e4),
-    ("sensor", "lag_s"): _Quantity("sensor_lag_s", "s", 0.0, 1e3),
-    ("start", "displacement_m"): _Quantity("start_displacement_m", "m", -1e3, 1e3),
-    ("start", "velocity_m_per_s"): _Quantity("start_velocity_m_per_s", "m/s", -1e6, 1e6),
-    ("damping", "gamma_per_s"): _Quantity("gamma_per_s", "1/s", 0.0, 1e6),
-    ("damping", "beta_per_m_s"): _Quantity("beta_per_m_s", "1/(m s)", 0.0, 1e6),
-    ("damping", "mu_m_per_s"): _Quantity("mu_m_per_s", "m/s", 0.0, 1e6),
+QUANTITIES: dict[tuple[str, str], Quantity] = {
+    ("bob", "mass_kg"): Quantity("bob_mass_kg", "kg", 1e-12, 1e6),
+    ("spring", "mass_kg"): Quantity("spring_mass_kg", "kg", 0.0, 1e6),
+    ("spring", "constant_n_per_m"): Quantity("spring_constant_n_per_m", "N/m", 1e-12, 1e12),
+    ("spring", "cubic_n_per_m3"): Quantity("spring_cubic_n_per_m3", "N/m3", -1e18, 1e18),
+    ("pendulum", "length_m"): Quantity("pendulum_length_m", "m", 1e-4, 1e4),
+    ("disc", "diameter_m"): Quantity("disc_diameter_m", "m", 1e-6, 1e3),
+    ("air", "temperature_c"): Quantity("air_temperature_c", "degC", -100.0, 200.0),
+    ("air", "pressure_pa"): Quantity("air_pressure_pa", "Pa", 1e-3, 1e7),
+    ("air", "relative_humidity"): Quantity("air_relative_humidity", "", 0.0, 1.0),
+    ("sensor", "sigma_m"): Quantity("sensor_sigma_m", "m", 1e-12, 1e3),
+    ("sensor", "mean_samples"): Quantity("sensor_mean_samples", "", 1.0, 1e4),
+    ("sensor", "lag_s"): Quantity("sensor_lag_s", "s", 0.0, 1e3),
+    ("start", "displacement_m"): Quantity("start_displacement_m", "m", -1e3, 1e3),
+    ("start", "velocity_m_per_s"): Quantity("start_velocity_m_per_s", "m/s", -1e6, 1e6),
+    ("damping", "gamma_per_s"): Quantity("gamma_per_s", "1/s", 0.0, 1e6),
+    ("damping", "beta_per_m_s"): Quantity("beta_per_m_s", "1/(m s)", 0.0, 1e6),
+    ("damping", "mu_m_per_s"): Quantity("mu_m_per_s", "m/s", 0.0, 1e6),
 }
 
-PLACES = {quantity.attribute: place for place, quantity in _QUANTITIES.items()}
+PLACES = {quantity.attribute: place for place, quantity in QUANTITIES.items()}
 """Table and key in a scene file for every quantity, by its attribute."""
 
 
@@ -126,7 +125,7 @@ class Scene:
 
     def __post_init__(self) -> None:
         """Check every value, and take a number or a pair (value, u) for the estimate that it states."""
-        for (table, key), quantity in _QUANTITIES.items():
+        for (table, key), quantity in QUANTITIES.items():
             if (given := getattr(self, quantity.attribute)) is not None:
                 found = _quantity(table, key, given, "scene")
                 if not isinstance(given, Estimate):
@@ -144,9 +143,9 @@ class Scene:
         """
         known: dict[str, Any] = {}
         for table, content in tables.items():
-            allowed = [key for name, key in (*_QUANTITIES, *_CHOICES) if name == table]
+            allowed = [key for name, key in (*QUANTITIES, *_CHOICES) if name == table]
             if not allowed:
-                names = ", ".join(dict.fromkeys(name for name, _ in _QUANTITIES))
+                names = ", ".join(dict.fromkeys(name for name, _ in QUANTITIES))
                 raise SceneError(f"{where}: unknown table [{_short(table)[1:-1]}]", f"allowed are {names}")
             if not isinstance(content, Mapping):
                 raise SceneError(
@@ -162,7 +161,7 @@ class Scene:
                     attribute, texts = _CHOICES[table, key]
                     known[attribute] = _choice(table, key, value, texts(), where)
                 else:
-                    known[_QUANTITIES[table, key].attribute] = _quantity(table, key, value, where)
+                    known[QUANTITIES[table, key].attribute] = _quantity(table, key, value, where)
         scene = cls(**known)
         _check_vapour(scene, where)
         return scene
@@ -170,7 +169,7 @@ class Scene:
     def to_mapping(self) -> dict[str, dict[str, Any]]:
         """Return the tables without unknown quantities; the inverse of :meth:`from_mapping`."""
         tables: dict[str, dict[str, Any]] = {}
-        for (table, key), quantity in _QUANTITIES.items():
+        for (table, key), quantity in QUANTITIES.items():
             estimate: Estimate | None = getattr(self, quantity.attribute)
             if estimate is not None:
                 plain = estimate.u == 0
@@ -181,20 +180,6 @@ class Scene:
             if (text := getattr(self, attribute)) is not None:
                 tables.setdefault(table, {})[key] = text
         return tables
-
-    def unusual(self) -> tuple[str, ...]:
-        """Return a clause for every implausible mass of the bob, and for values no larger than their uncertainties."""
-        clauses = []
-        if (bob := self.bob_mass_kg) is not None and not USUAL_BOB_KG[0] <= bob.value <= USUAL_BOB_KG[1]:
-            usual = f"{USUAL_BOB_KG[0]:g} to {USUAL_BOB_KG[1]:g} kg"
-            clauses.append(f"[bob] mass_kg = {bob.value:g} is beyond {usual}: did you mean grams?")
-        for (table, key), q in _QUANTITIES.items():
-            found: Estimate | None = getattr(self, q.attribute)
-            if found is not None and q.least > 0.0 and found.u >= found.value:
-                clauses.append(
-                    f"[{table}] {key} = {found.value:g} has an uncertainty as large as the value, u = {found.u:g}"
-                )
-        return tuple(clauses)
 
     @property
     def tells_of_sensor(self) -> bool:
@@ -224,13 +209,19 @@ def _choice(table: str, key: str, value: object, texts: tuple[str, ...], where: 
 
 
 def _quantity(table: str, key: str, given: Any, where: str) -> Estimate:
-    quantity = _QUANTITIES[table, key]
+    quantity = QUANTITIES[table, key]
     name = f"{where}: [{table}] {key}"
     value, u, unit = given, 0.0, ""
     if isinstance(given, Mapping):
         if "value" not in given or set(given) - {"value", "u"}:
             raise SceneError(f"{name} must be a number or {{ value = ..., u = ... }}, got {_short(dict(given))}")
         value, u = given["value"], given.get("u", 0.0)
+    elif isinstance(given, str):
+        try:
+            read = typed(given, quantity.unit)
+        except ValueError as error:
+            raise SceneError(f"{name} {error}, got {_short(given)}") from error
+        value, u = read.value, read.u
     elif isinstance(given, tuple) and len(given) == 2:  # as in Scene(bob_mass_kg=(0.2, 0.0001))
         value, u = given
     elif isinstance(given, Estimate):
