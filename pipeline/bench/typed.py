@@ -78,7 +78,7 @@ def typed(text: str, unit: str) -> Estimate:
     Examples
     --------
     >>> typed("217.6 g", "kg"), typed("10.2+/-0.1 cm", "m"), typed("1005(1) hPa", "Pa"), typed("21 °C", "degC")
-    (0.2176 kg, 0.1020 +- 0.0010 m, 100500 +- 100 Pa, 21 degC)
+    (0.2176 kg, 0.1020(10) m, 1.0050(10)e+05 Pa, 21 degC)
     """
     from uncertainties import ufloat_fromstr
     from uncertainties.core import NegativeStdDev
