@@ -56,6 +56,7 @@ QUANTITIES: dict[tuple[str, str], Quantity] = {
     ("sensor", "sigma_m"): Quantity("sensor_sigma_m", "m", 1e-12, 1e3),
     ("sensor", "mean_samples"): Quantity("sensor_mean_samples", "", 1.0, 1e4),
     ("sensor", "lag_s"): Quantity("sensor_lag_s", "s", 0.0, 1e3),
+    ("sensor", "clock_ppm"): Quantity("sensor_clock_ppm", "ppm", -1e5, 1e5),
     ("start", "displacement_m"): Quantity("start_displacement_m", "m", -1e3, 1e3),
     ("start", "velocity_m_per_s"): Quantity("start_velocity_m_per_s", "m/s", -1e6, 1e6),
     ("damping", "gamma_per_s"): Quantity("gamma_per_s", "1/s", 0.0, 1e6),
@@ -90,6 +91,7 @@ class Scene:
     sensor_position: str | None = None
     sensor_mean_samples: Estimate | None = None
     sensor_lag_s: Estimate | None = None
+    sensor_clock_ppm: Estimate | None = None
     start_displacement_m: Estimate | None = None
     start_velocity_m_per_s: Estimate | None = None
     gamma_per_s: Estimate | None = None
@@ -115,6 +117,7 @@ class Scene:
             sensor_position: str | None = None,
             sensor_mean_samples: Stated = None,
             sensor_lag_s: Stated = None,
+            sensor_clock_ppm: Stated = None,
             start_displacement_m: Stated = None,
             start_velocity_m_per_s: Stated = None,
             gamma_per_s: Stated = None,

@@ -84,7 +84,10 @@ class Loaded:
         recording = self.recording
         track = to_track(self.samples, self.info, recorded_format=recording.format, provenance=self.provenance)
         track = between(track, self.from_s, self.to_s)
-        return track if self.clock_ppm is None else replace(track, clock_limit=self.clock_ppm * 1e-6)
+        if self.clock_ppm is None:
+            return track
+        bound = 1e-6 * self.clock_ppm
+        return replace(track, clock_limit=bound, u_clock=bound / math.sqrt(3.0))
 
     @property
     def source(self) -> str:
