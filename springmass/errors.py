@@ -17,7 +17,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import sys
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 from failure import Error as Error
 
@@ -27,6 +27,12 @@ LOG = logging.getLogger("springmass")
 HINT = logging.INFO + 1
 """Level of the next command to type, which only a terminal shows."""
 NO_MEMORY = "there is not enough memory; end other programs, or raise the limit"
+
+
+def of_several(codes: Collection[int]) -> int:
+    """Return the exit code of a command whose inputs ended with these."""
+    failed = any(code not in (OK, REJECTED) for code in codes)
+    return SOME_FAILED if failed and len({*codes}) > 1 else max(codes)
 
 
 class ProgramError(Error):

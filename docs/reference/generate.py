@@ -1,4 +1,4 @@
-"""Write the tables of options in command-line.md, and findings.md, from the declarations in the program.
+"""Write the tables of command-line.md and estimates.md, and findings.md, from the declarations in the program.
 
 ``python docs/reference/generate.py`` brings the pages up to date; ``tests/docs/test_docs.py`` checks that they are.
 """
@@ -13,11 +13,14 @@ from cyclopts import Group
 from cyclopts.argument import Argument
 
 from pipeline.findings.finding import RANK, FindingKind, kinds, usual_advice
+from pipeline.quantities import QUANTITIES
+from pipeline.results.formulas import FORMULAS
 from springmass.commands import COMMANDS, app
 from springmass.commands.options import HOW_READ, THE_PAGE
 
 PAGE = Path(__file__).with_name("command-line.md")
 FINDINGS_PAGE = Path(__file__).with_name("findings.md")
+ESTIMATES_PAGE = Path(__file__).with_name("estimates.md")
 SHOWN = {"error": "error", "warning": "warning", "info": "note"}
 TABLE = re.compile(r"<!-- options of (?P<what>[\w ]+) -->\n.*?<!-- end -->\n", re.DOTALL)
 LIST = re.compile(r"<!-- commands -->\n.*?<!-- end -->\n", re.DOTALL)
@@ -27,6 +30,34 @@ ELSEWHERE = {
     THE_PAGE: "as for `springmass page`",
 }
 """Groups of options with a separate table, and what the other tables say about them."""
+
+ESTIMATES = re.compile(r"<!-- estimates (?P<which>with|without) a scene -->\n.*?<!-- end -->\n", re.DOTALL)
+NEEDS = {
+    "bob_mass": "bob mass",
+    "disc_diameter": "disc",
+    "known_air": "air temperature",
+    "pendulum_length": "`[pendulum] length_m`",
+}
+"""What a result needs of a scene, by the input of the formulas."""
+LAW = "fit and choice of the law"
+INCLUDES = {
+    "phase_slope": "scatter, correlation and bend of the phases",
+    "start_phase": "scatter, correlation and bend of the phases",
+    "small_swings": "scatter of the phases",
+    **dict.fromkeys(("law", "law_start", "law_rate", "law_rms"), LAW),
+    "rest_position": "scatter, correlation and drift of the rest position",
+    "noise_of_samples": "counting statistics, difference from the root mean square, share of samples left out",
+    **dict.fromkeys(("amplitude_factor", "rate_factor", "offset_misfit", "phase_misfit"), "misfit of the model"),
+    "sensor_zero": "calibration of the zero",
+    "sensor_filter": "filter of the sensor",
+    "time_factor": "clock rate",
+    "distance_scale": "distance scale",
+    "bob_mass": "masses",
+    "pendulum_length": "length",
+    "disc_diameter": "diameter",
+    **dict.fromkeys(("air", "known_air"), "air and its formulas"),
+}
+"""What u of a result includes, by the input of the formulas."""
 
 HEAD = """\
 # Findings
@@ -122,6 +153,35 @@ def updated(page: str) -> str:
     )
 
 
+def inputs_of(name: str, *, needed: bool) -> set[str]:
+    """Return the inputs that a result depends on, or those that it needs."""
+    if name not in FORMULAS:
+        return {name}
+    formula = FORMULAS[name]
+    return set().union(*(inputs_of(each, needed=needed) for each in (formula.needed if needed else formula.parameters)))
+
+
+def estimates(which: str) -> str:
+    """Return the table of the estimates that a scene determines, or of the others."""
+    heads = ["name", "unit", "definition", *["needs"] * (which == "with"), "what u includes"]
+    rows = [heads, ["---"] * len(heads)]
+    for name in (each for each in FORMULAS if each in QUANTITIES):
+        needs = [words for each, words in NEEDS.items() if each in inputs_of(name, needed=True)]
+        if bool(needs) == (which == "with"):
+            inputs = inputs_of(name, needed=False)
+            includes = dict.fromkeys(words for each, words in INCLUDES.items() if each in inputs)
+            row = [f"`{name}`", QUANTITIES[name].unit_in("m") or "1", FORMULAS[name].definition]
+            rows.append([*row, *[", ".join(needs)] * (which == "with"), "; ".join(includes)])
+    return "".join(f"| {' | '.join(row)} |\n" for row in rows)
+
+
+def estimates_page(page: str) -> str:
+    """Return the page of estimates with its tables as the formulas are."""
+    return ESTIMATES.sub(
+        lambda found: f"<!-- estimates {found['which']} a scene -->\n{estimates(found['which'])}<!-- end -->\n", page
+    )
+
+
 def findings_page() -> str:
     """Return the page of findings, grouped by symptom and the gravest first."""
     groups: dict[str, list[tuple[str, FindingKind]]] = {}
@@ -140,4 +200,5 @@ def findings_page() -> str:
 if __name__ == "__main__":
     PAGE.write_text(updated(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
     FINDINGS_PAGE.write_text(findings_page(), encoding="utf-8")
+    ESTIMATES_PAGE.write_text(estimates_page(ESTIMATES_PAGE.read_text(encoding="utf-8")), encoding="utf-8")
     print(f"{len(COMMANDS)} commands, {len(kinds())} finding codes")

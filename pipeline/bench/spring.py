@@ -6,7 +6,8 @@ import math
 
 from pipeline.numerics.estimate import Estimate
 
-# Maximum mass of an unweighed spring over the bob's; laboratory springs have 5 to 50 g for bobs of 0.1 to 0.5 kg.
+# Maximum mass of an unweighed spring over the bob's, beyond which its probability is taken as zero: laboratory springs
+# have 5 to 50 g for bobs of 0.1 to 0.5 kg.
 HEAVIEST_SHARE = 0.3
 GRAVITY_M_PER_S2 = 9.80665  # standard gravity, by definition, 3rd CGPM (1901)
 # Ratio of spring mass to load up to which the series of Fox and Mahanty (1970) is exact to 1e-13.

@@ -20,8 +20,7 @@ def separate(samples: Samples, cycles: Cycles, windows: Windows, *, sought: bool
 
     A mode of amplitude B at a distance :math:`\\Delta f` from the main frequency leaves up to
     :math:`B/(\\pi\\,\\Delta f\\,T)` in the amplitude of a record of length T. If this is less than a tenth of the
-    amplitude's standard uncertainty for every mode, the modes are reported but not subtracted. If they are subtracted,
-    the windows' variances are increased, because the modes are estimated from the same samples.
+    amplitude's standard uncertainty for every mode, the modes are reported but not subtracted.
     """
     modes = find_modes(samples, windows) if sought else Modes(samples)
     leak = _leak(modes)
@@ -33,32 +32,11 @@ def separate(samples: Samples, cycles: Cycles, windows: Windows, *, sought: bool
             modes = cleaner
         subtracted = modes.position(samples.track.t)
         windows = demodulate(samples.less(subtracted), cycles)
-    windows = replace(windows, covariance=windows.covariance * _price(modes))
     return windows, replace(modes, samples=samples.less(subtracted), subtracted=subtracted, leak=leak)
 
 
 def _u_amplitude(windows: Windows) -> float:
     return 1.0 / math.sqrt(float(np.sum(1.0 / np.maximum(windows.covariance[:, 0, 0], 1e-300))))
-
-
-def _price(modes: Modes) -> float:
-    """Return the factor by which variances grow because the modes were estimated from the same samples.
-
-    It is the largest of the factors for rest position, amplitude, phase, frequency and decay. They follow from the
-    normal equations with and without the modes' columns, at twelve times per period.
-    """
-    carrier = modes.carrier
-    assert carrier is not None
-    start, end = carrier.t[0], carrier.t[-1]
-    t = np.linspace(start, end, int(12 * (end - start) * carrier.angular_frequency / (2.0 * math.pi)))
-    wave, x = carrier.wave(t), (t - start) / (end - start) - 0.5
-    pair = np.array([wave.real, wave.imag])
-    main = np.concatenate([np.ones((1, t.size)), pair, x * pair])
-    both = np.concatenate([main, modes.columns(t).T])
-    both /= np.linalg.norm(both, axis=1)[:, None]
-    alone = np.linalg.pinv(both[:5] @ both[:5].T, hermitian=True)
-    together = np.linalg.pinv(both @ both.T, hermitian=True)[:5, :5]
-    return max(1.0, float(np.max(np.diag(together) / np.diag(alone))))
 
 
 def _leak(modes: Modes) -> float:

@@ -96,7 +96,8 @@ class Estimate(UFloat):  # type: ignore[misc]
     def __eq__(self, other: object) -> bool:
         if isinstance(other, Estimate):
             return (self.value, self.u, self.unit) == (other.value, other.u, other.unit)
-        return bool(super().__eq__(other))
+        equal = super().__eq__(other)
+        return equal is not NotImplemented and bool(equal)  # None, for example, is no number
 
     def __bool__(self) -> bool:
         return True  # an estimate is there, also if it is 0: `scene.air_temperature_c or TYPICAL_TEMPERATURE`

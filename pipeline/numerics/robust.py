@@ -11,8 +11,8 @@ from pipeline.track import F8
 
 MAD_TO_SIGMA = 1.482602218505602  # 1 / Phi^-1(3/4): P. J. Rousseeuw, C. Croux, J. Am. Stat. Assoc. 88 (1993) 1273
 
-# Relative standard uncertainty of that estimate from n normal deviates, times the root of n: its efficiency is 37 %
-# (the same source). It is also the relative change per share of outliers: 0.5/(2 phi(0.6745) 0.6745).
+# Relative standard uncertainty of that estimate from n normal deviates, times the root of n: its efficiency is 37 %,
+# Rousseeuw and Croux (1993). It is also the relative change per share of outliers: 0.5/(2 phi(0.6745) 0.6745).
 U_OF_MAD = 1.17
 
 

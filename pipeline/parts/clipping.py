@@ -130,7 +130,8 @@ def _fitted(slices: WindowSamples, basis: F8, inside: Bools, least: float) -> tu
     solution = solve(basis, (inside & usable).astype(np.float64))
     middle = solution.residual[inside & usable & solution.good[:, None]]
     sigma = max(least, mad_sigma(middle)) if middle.size else least
-    refit(basis, solution, (inside & usable & (np.abs(solution.residual) < OUTLIER * sigma)).astype(np.float64))
+    near = inside & usable & (np.abs(solution.residual) < OUTLIER * sigma)
+    solution = refit(basis, solution, near.astype(np.float64))
     rest, a, b = solution.coefficients.T
     part = basis[:, :3]
     u = np.sqrt(np.maximum(np.sum(part * (solution.inverse @ part), axis=1), 0.0))

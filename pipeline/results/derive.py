@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from pipeline.bench.disc import ADDED_MASS_SHAPE
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.bench.sensor_filter import SensorFilter
-from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
+from pipeline.bench.spring import unstated_spring_kg
 from pipeline.checks.residual import Misfit
 from pipeline.damping.average import Weighted, average_over_laws, scaled
 from pipeline.damping.law_fit import LawFit, mean_squared_rate
@@ -31,6 +30,7 @@ from pipeline.results.ambient import Ambient
 from pipeline.results.budget import Budget, Inputs, function_of, joint_of
 from pipeline.results.curves import Curve, drag_curve, energy_curve
 from pipeline.results.effects import Effect
+from pipeline.results.formulas import solve
 from pipeline.track import F8, UNUSABLE, Quality, Track
 from pipeline.windows.demodulate import Windows
 
@@ -143,9 +143,13 @@ def derive(
     inputs = Inputs()
     laws = _Laws(fitted.damping, inputs, fitted.windows)
     unit = track.unit
-    every, coefficients, scales = _results(track, fitted, scene, effects, misfits, laws, inputs)
-    found = {name: (x, _unit_of(name, unit)) for name, x in every.items() if x is not None}
-    parts = {name: Estimate.of_variable(*found.pop(name)) if name in found else None for name in _PARTS}
+    of_scene = _of_scene(track, scene, effects, inputs)
+    every = solve(of_scene | _of_motion(track, fitted, misfits, laws, inputs))
+    coefficients = every["coefficients"]
+    found = {name: (x, _unit_of(name, unit)) for name, x in every.items() if name in QUANTITIES}
+    parts = {
+        name: Estimate.of_variable(every[name], _unit_of(name, unit)) if name in every else None for name in _PARTS
+    }
     budgets = {name: inputs.budget(name, x, own) for name, (x, own) in (found | coefficients).items()}
     law = laws.stated.name if len(laws.weighted) == 1 and laws.stated.name == fitted.damping.selected else ""
     return Derived(
@@ -156,7 +160,7 @@ def derive(
         law=law,
         law_of_coefficients=laws.shown.name,
         quoted=laws.quoted,
-        scales=scales,
+        scales=(every["rates"], every["lengths"]),
         **parts,
     )
 
@@ -187,105 +191,73 @@ def _unit_of(name: str, unit: str) -> str:
 _LENGTHS = ("m", "m/s", "m/s^2")  # units in which a displacement, or a derivative of it, is recorded
 
 
-def _results(
-    track: Track,
-    fitted: Fitted,
-    scene: Scene,
-    effects: tuple[Effect, ...],
-    misfits: tuple[Misfit, ...],
-    laws: _Laws,
-    inputs: Inputs,
-) -> tuple[dict[str, Any], dict[str, tuple[Any, str]], tuple[Any, Any]]:
-    """Return the results by name, None where record or scene do not determine them, coefficients, and scales.
-
-    The scales are the factors that convert rates and lengths of the record to true seconds and metres. A new estimate
-    is one entry here and one in :data:`pipeline.quantities.QUANTITIES`.
-    """
+def _of_motion(
+    track: Track, fitted: Fitted, misfits: tuple[Misfit, ...], laws: _Laws, inputs: Inputs
+) -> dict[str, Any]:
+    """Return the inputs of the formulas that the recording and its fit give; None for what they do not determine."""
     windows, damping, phase, rest = fitted.windows, fitted.damping, fitted.phase, fitted.rest
-    instrument, unit = Instrument.of(track), track.unit
-    ambient = Ambient(scene, inputs, u_temperature_k=U_AIR_TEMPERATURE_K)
-    amiss = _amiss(misfits, inputs)
+    instrument, unit, amiss = Instrument.of(track), track.unit, _amiss(misfits, inputs)
 
     def less_certain(name: str, value: float) -> Any:
         """Return a factor of mean 1 that adds the uncertainty from the misfits to an estimate of this value."""
         return 1.0 + amiss[name] / float(value) if value else 1.0
 
-    rate = inputs.add("clock_rate", instrument.clock_rate, "B") * (1.0 + amiss["clock"])
-    scale = ambient.scale(instrument) if unit == "m" else 1.0
     count = phase.residual.size
     # With one or two windows the uncertainty comes from the samples.
     free = (count - 2) / phase.correlation if count > 2 else windows.residual.size - 3.0 * count
     slope = inputs.add("angular_frequency", phase.angular_frequency, "A", free)
-    omega = slope * rate
-    gain, delay = _filtered(SensorFilter.of(scene, track.rate_hz), omega, inputs)
-    lengths = scale * less_certain("amplitude", laws.values[0]) / gain
-    rates = rate * less_certain("damping_rate", laws.values[1])
-    start = laws.start * lengths * _crest(phase, laws, unit, inputs)
     small = _small_swings(phase, laws, windows)
-    slow = None if small is None else inputs.add("small_swings", small, "A", free) * rate
-    lam = laws.rate_at_start * rates
-    squared_rate = laws.squared_rate if phase.squared_rate is None else phase.squared_rate
-    natural = omega**2 + squared_rate * rate**2
-    # The ratio of displacement to recorded value; it is unknown for a voltage or a force.
-    displacement = {"m": 1.0, "m/s": natural**-0.5, "m/s^2": 1.0 / natural}.get(unit)
-    zero = inputs.add("sensor_zero", Estimate(0.0, instrument.u_offset_m, unit), "B")
-    offset = inputs.add("rest_position", rest.mean, "A", free) * scale
-    noise = inputs.add("noise", _noise(windows, unit), "A", windows.residual.size - 3.0 * count)
-    coefficients = _coefficients(laws, rates, lengths, lam, start)
-    length: Any = scene.pendulum_length_m
-    per_angle = {"rad": 1.0, "rad/s": natural**-0.5}.get(unit)
-    if slow is None and per_angle is not None:
-        # The recording shows no change with the amplitude: that of a pendulum, A^2/16, is below its u.
-        at_rest = omega * (1.0 + (laws.root_mean_square * per_angle) ** 2 / 8.0)
-    else:
-        at_rest = slow
-    if length is not None and per_angle is not None:
-        length = inputs.add("pendulum_length", length, "B")
-    diameter: Any = None if scene.disc_diameter_m is None else inputs.add("disc_diameter", scene.disc_diameter_m, "B")
-    own, share = _masses(scene, effects, diameter, ambient, inputs)
-    mass = own if share is None else own + share
-    # The amplitude of a length or an angle, whose time derivative of some order was recorded.
-    moving = omega**2 + lam**2
-    swing: Any = {"m": start, "m/s": start * moving**-0.5, "m/s^2": start / moving}.get(unit)
-    per_value = displacement if per_angle is None else per_angle
-    speed = None if per_value is None else omega * lengths * laws.root_mean_square * per_value
-    # An angle may be that of a pendulum, so a spring constant is given only if the scene has a spring.
-    sprung = not unit.startswith("rad") or scene.spring_mass_kg is not None
-    results = {
-        "period": 2 * math.pi / omega,
-        "period_small_swings": None if slow is None else 2 * math.pi / slow,
-        "frequency": omega / (2 * math.pi),
-        "angular_frequency": omega,
-        "amplitude": start,
-        "offset": offset + zero + amiss["offset"],
-        "phase": _start_phase(phase, slope, inputs, free) + amiss["phase"] + delay,
-        "noise": noise,
-        "damping_rate": lam,
-        "displacement_amplitude": None if unit == "m" else swing,  # not stated twice
-        "angle_amplitude": start * moving**-0.5 if unit == "rad/s" else None,
-        "velocity_rms": speed,
-        "gravity": None if length is None or at_rest is None or per_angle is None else length * at_rest**2,
-        "quality_factor": 0.5 * natural**0.5 / lam if laws.values[1] > 0 else None,
-        "displacement": displacement,
-        "effective_mass_kg": mass,
-        "own_mass_kg": own,
-        "spring_constant": natural * mass if sprung and mass is not None else None,
+    return {
+        "phase_slope": slope,
+        "small_swings": None if small is None else inputs.add("small_swings", small, "A", free),
+        "squared_rate": laws.squared_rate if phase.squared_rate is None else phase.squared_rate,
+        "time_factor": inputs.add("clock_rate", instrument.clock_rate, "B") * (1.0 + amiss["clock"]),
+        "amplitude_factor": less_certain("amplitude", laws.values[0]),
+        "rate_factor": less_certain("damping_rate", laws.values[1]),
+        "law": laws.coefficients,
+        "law_start": laws.start,
+        "law_rate": laws.rate_at_start,
+        "law_rms": laws.root_mean_square,
+        "decays": laws.values[1] > 0 or None,
+        "beta_settled": (damping.settled and damping.best.drag_term("beta") is not None) or None,
+        "crest": _crest(phase, laws, unit, inputs),
+        "rest_position": inputs.add("rest_position", rest.mean, "A", free),
+        "sensor_zero": inputs.add("sensor_zero", Estimate(0.0, instrument.u_offset_m, unit), "B"),
+        "offset_misfit": amiss["offset"],
+        "start_phase": _start_phase(phase, slope, inputs, free),
+        "phase_misfit": amiss["phase"],
+        "noise_of_samples": inputs.add("noise", _noise(windows, unit), "A", windows.residual.size - 3.0 * count),
+        # The order of the time derivative that was recorded; it is unknown for a voltage or a force.
+        "order": {"m": 0, "rad": 0, "m/s": 1, "rad/s": 1, "m/s^2": 2}.get(unit),
+        "of_length": unit in _LENGTHS or None,
+        "of_angle": unit in ("rad", "rad/s") or None,
     }
-    if displacement is not None:
-        stiffness = 0.5 * (omega * scale / gain * displacement) ** 2
-        results["half_stiffness"] = stiffness if mass is None else stiffness * mass
-    if displacement is not None and diameter is not None:
-        results["keulegan_carpenter_number"] = 2 * math.pi * swing / diameter
-        if ambient.known:
-            per_speed = ambient.density * diameter / ambient.viscosity()
-            results["reynolds_number"] = per_speed * speed
-            results["reynolds_number_start"] = per_speed * omega * swing / math.sqrt(2.0)
-        if ambient.known and mass is not None:
-            per_beta = 6.0 * mass / (omega * ambient.density * diameter**2) / displacement
-            results["drag_length"] = per_beta * rate / scale * gain
-            if damping.settled and damping.best.drag_term("beta") is not None:
-                results["drag_coefficient"] = per_beta * coefficients["beta"][0]
-    return results, coefficients, (rates, lengths)
+
+
+def _of_scene(track: Track, scene: Scene, effects: tuple[Effect, ...], inputs: Inputs) -> dict[str, Any]:
+    """Return the inputs of the formulas that the scene gives; None for what it does not state."""
+    included = {effect.name for effect in effects if effect.included}
+    air = Ambient(scene, inputs, u_temperature_k=U_AIR_TEMPERATURE_K)
+
+    def stated(name: str, value: Estimate | None) -> Any:
+        return None if value is None else inputs.add(name, value, "B")
+
+    bob, spring = scene.bob_mass_kg, scene.spring_mass_kg
+    unstated = None if bob is None or spring is not None else unstated_spring_kg(bob.value)
+    return {
+        "air": air,
+        "known_air": air if air.known else None,
+        "distance_scale": air.scale(Instrument.of(track)) if track.unit == "m" else 1.0,
+        "sensor_filter": _filter(SensorFilter.of(scene, track.rate_hz), inputs),
+        "pendulum_length": stated("pendulum_length", scene.pendulum_length_m),
+        "disc_diameter": stated("disc_diameter", scene.disc_diameter_m),
+        "bob_mass": stated("bob_mass", bob),
+        "spring_mass": stated("spring_mass", spring) if "spring_mass" in included else None,
+        "unstated_spring_mass": stated("unstated_spring_mass", unstated),
+        "of_added_mass": "added_mass" in included or None,
+        # An angle may be that of a pendulum, so a spring constant is given only if the scene has a spring.
+        "of_spring": not track.unit.startswith("rad") or spring is not None or None,
+    }
 
 
 def _small_swings(phase: Phase, laws: _Laws, windows: Windows) -> Estimate | None:
@@ -332,15 +304,15 @@ def _amiss(misfits: tuple[Misfit, ...], inputs: Inputs) -> Mapping[str, Any]:
     return by_name
 
 
-def _filtered(smoothing: SensorFilter | None, omega: Any, inputs: Inputs) -> tuple[Any, Any]:
-    """Return the gain of the sensor's filter and the delay of an oscillation by it, rad."""
+def _filter(smoothing: SensorFilter | None, inputs: Inputs) -> Callable[[Any], tuple[Any, Any]]:
+    """Return gain and delay, rad, of the sensor's filter as a function of the angular frequency."""
     if smoothing is None:
-        return 1.0, 0.0
+        return lambda _: (1.0, 0.0)
     sizes = [
         inputs.add(name, size, "B") if size.u > 0.0 else size.value
         for name, size in (("sensor_mean_samples", smoothing.mean_samples), ("sensor_lag", smoothing.lag_s))
     ]
-    return function_of(smoothing.gain, omega, *sizes), function_of(smoothing.delay, omega, *sizes)
+    return lambda omega: (function_of(smoothing.gain, omega, *sizes), function_of(smoothing.delay, omega, *sizes))
 
 
 class _Laws:
@@ -379,6 +351,18 @@ class _Laws:
             quantities = quantities + np.array(inputs.add_joint("choice_of_law", joint, "A"))
         self.start, self.rate_at_start, self.root_mean_square = quantities.tolist()
 
+    def coefficients(self, rate: Any, scale: Any, lam: Any, start: Any) -> dict[str, tuple[Any, str]]:
+        """Return the coefficients of the law of the results, in true seconds and metres.
+
+        If the record shows one drag only, c A^n, and the results allow for a little of another one, c follows from
+        them: :math:`\\lambda A_0 = c A_0^n`.
+        """
+        found = _in_true_units(self.stated.law, self.stated.joint, self.variables, rate, scale)
+        shown = self.shown.law
+        if shown is not self.stated.law and isinstance(shown, Drag):
+            return {COEFFICIENTS[n]: (lam / start ** (n - 1), found[COEFFICIENTS[n]][1]) for n in shown.powers}
+        return {name: found[name] for name in self.stated.joint.names[1:]}
+
 
 def _root(covariance: F8) -> F8:
     """Return R such that R R^T is the covariance (p, p), so that products give no negative variance at any scaling."""
@@ -409,19 +393,6 @@ def _start_phase(phase: Phase, slope: Any, inputs: Inputs, dof: float) -> Any:
     return inputs.add("phase", Estimate(at_start.value, own, at_start.unit), "A", dof) + way * (slope - omega.value)
 
 
-def _coefficients(laws: _Laws, rate: Any, scale: Any, lam: Any, start: Any) -> dict[str, tuple[Any, str]]:
-    """Return the coefficients of the law of the results, in true seconds and metres.
-
-    If the record shows one drag only, c A^n, and the results allow for a little of another one, c follows from them:
-    :math:`\\lambda A_0 = c A_0^n`.
-    """
-    found = _in_true_units(laws.stated.law, laws.stated.joint, laws.variables, rate, scale)
-    shown = laws.shown.law
-    if shown is not laws.stated.law and isinstance(shown, Drag):
-        return {COEFFICIENTS[n]: (lam / start ** (n - 1), found[COEFFICIENTS[n]][1]) for n in shown.powers}
-    return {name: found[name] for name in laws.stated.joint.names[1:]}
-
-
 def _in_true_units(law: Law, joint: Joint, variables: list[Any], rate: Any, scale: Any) -> dict[str, tuple[Any, str]]:
     """Return the parameters of a law in true seconds and metres, with their units."""
     values = dict(zip(joint.names, variables, strict=True))
@@ -431,24 +402,6 @@ def _in_true_units(law: Law, joint: Joint, variables: list[Any], rate: Any, scal
         metres = unit.metre - values[unit.less] if unit.less else unit.metre
         found[name] = (values[name] * scale**metres * rate**-unit.second, printed)
     return found
-
-
-def _masses(
-    scene: Scene, effects: tuple[Effect, ...], diameter: Any, ambient: Ambient, inputs: Inputs
-) -> tuple[Any, Any]:
-    """Return the mass of the bob, with the air carried along if the effects include it, and the share of the spring."""
-    if scene.bob_mass_kg is None:
-        return None, None
-    own = inputs.add("bob_mass", scene.bob_mass_kg, "B")
-    included = {effect.name for effect in effects if effect.included}
-    if "added_mass" in included and diameter is not None:
-        own = own + ADDED_MASS_SHAPE / 8.0 * ambient.density * diameter**3
-    if "spring_mass" in included and scene.spring_mass_kg is not None:
-        spring = inputs.add("spring_mass", scene.spring_mass_kg, "B")
-        return own, function_of(oscillating_mass_kg, spring, own) - own
-    if scene.spring_mass_kg is None:
-        return own, inputs.add("unstated_spring_mass", unstated_spring_kg(scene.bob_mass_kg.value), "B") / 3.0
-    return own, None
 
 
 def _noise(windows: Windows, unit: str) -> Estimate:

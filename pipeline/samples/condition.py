@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import AnalysisError
-from pipeline.numerics.levels import normal_quantile
+from pipeline.numerics.levels import FEWEST_FOR_CURVE, FEWEST_FOR_MEDIAN, NEGLIGIBLE, SIGNIFICANT, normal_quantile
 from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8, U8, UNUSABLE, Quality, Track
 
@@ -109,7 +109,7 @@ def condition(track: Track) -> Samples:
     judged = (flags & np.uint8(Quality.DUPLICATE_TIME | Quality.NON_MONOTONIC_TIME)) != 0
     flags |= _time_flags(np.where(judged, np.nan, track.t), judged)
     clean = (flags & UNUSABLE) == 0
-    if np.count_nonzero(clean) < 8:
+    if np.count_nonzero(clean) < FEWEST_FOR_CURVE:
         flagged = {flag: int(np.count_nonzero(flags & np.uint8(flag))) for flag in Quality if flag & UNUSABLE}
         why = ", ".join(f"{count} {flag.name.lower()}" for flag, count in flagged.items() if count and flag.name)
         raise AnalysisError(
@@ -150,7 +150,7 @@ def coarsest_step(ordered: F8, stated: float | None) -> float | None:
     least = float(steps[apart].min())
     # Values in steps are whole steps apart; those of a computed motion that repeats itself are not.
     near = steps[apart & (steps < 50.0 * least)] / least
-    if np.mean(np.abs(near - np.rint(near)) > 0.1) > 0.1:
+    if np.mean(np.abs(near - np.rint(near)) > NEGLIGIBLE) > NEGLIGIBLE:
         return stated
     return least if stated is None or least > 1.5 * stated else stated
 
@@ -202,7 +202,7 @@ def _edges(t: F8, rate_hz: float) -> list[int]:
 
 def _spikes(y: F8, half_step: float, sigmas: float, edges: list[int]) -> NDArray[np.bool_]:
     """Return which samples deviate from the median of five around them by more than noise and curvature explain."""
-    if y.size < 8:
+    if y.size < FEWEST_FOR_CURVE:
         return np.zeros(y.size, np.bool_)
     second = np.diff(y, 2)
     rounding = 1e-12 * float(np.abs(y).max())
@@ -224,7 +224,7 @@ def _spikes(y: F8, half_step: float, sigmas: float, edges: list[int]) -> NDArray
             return local
         # So many spikes also come in runs, which a median of five follows; but few of them lie within the motion.
         middle = float(np.median(y[~spikes]))
-        reach = 3.0 * mad_sigma(y[~spikes] - middle)
+        reach = SIGNIFICANT * mad_sigma(y[~spikes] - middle)
         spikes |= np.abs(y - middle) > reach
     return spikes
 
@@ -250,7 +250,7 @@ def _beyond(y: F8, bound: float | F8, edges: list[int]) -> NDArray[np.bool_]:
         worst = found[away[found] >= away[near].max(axis=1)]
         spikes[worst] = True
         kept = np.flatnonzero(~spikes)
-        if kept.size < 8:
+        if kept.size < FEWEST_FOR_CURVE:
             break
         smooth = y.copy()
         smooth[spikes] = np.interp(np.flatnonzero(spikes), kept, y[kept])
@@ -305,12 +305,12 @@ def _plateau(y: F8, ordered: F8, noise: float) -> tuple[float, float, NDArray[np
     low, high = ordered[0], ordered[-1]
     if (level := _saturated(y, ordered)) is not None:
         return level, level, np.flatnonzero(y >= level)
-    width = 6.0 * noise
+    width = 2.0 * SIGNIFICANT * noise
     if high - low < 6.0 * width or width == 0.0:
         return 0.0, 0.0, none
     first = int(np.searchsorted(ordered, low + 0.6 * (high - low)))
     upper = ordered[first:]
-    few = math.ceil(max(0.02 * y.size, 8))
+    few = math.ceil(max(0.02 * y.size, FEWEST_FOR_CURVE))
     # Bands that begin at these indices contain enough samples.
     starts = np.flatnonzero(upper[few - 1 :] <= upper[: max(upper.size - few + 1, 0)] + width)
     if not starts.size:
@@ -321,11 +321,11 @@ def _plateau(y: F8, ordered: F8, noise: float) -> tuple[float, float, NDArray[np
     bottom = upper[start]
     above = upper.size - start - inside
     beneath = first + start - int(np.searchsorted(ordered, bottom - width))
-    if above > 0.1 * inside or inside < CONTRAST * (beneath + 1):
+    if above > NEGLIGIBLE * inside or inside < CONTRAST * (beneath + 1):
         return 0.0, 0.0, none
     band = (y >= bottom) & (y <= bottom + width)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], band.astype(np.int8), [0]])))
-    if np.median(edges[1::2] - edges[::2]) < 3 or not _clipped_often(y, band, bottom - 3.0 * width):
+    if np.median(edges[1::2] - edges[::2]) < FEWEST_FOR_MEDIAN or not _clipped_often(y, band, bottom - 3.0 * width):
         return 0.0, 0.0, none
     # Samples in heavy tails of the noise lie above the band but still belong to the plateau.
     members = np.flatnonzero(y >= bottom)
@@ -334,11 +334,11 @@ def _plateau(y: F8, ordered: F8, noise: float) -> tuple[float, float, NDArray[np
 
 def _saturated(y: F8, ordered: F8) -> float | None:
     """Return the value at which a sensor clips its noisy signal at the top, or None where it does not."""
-    few = max(int(0.02 * y.size), 8)
+    few = max(int(0.02 * y.size), FEWEST_FOR_CURVE)
     level = float(ordered[-max(few // 2, 1)])
     first, last = np.searchsorted(ordered, level), np.searchsorted(ordered, level, side="right")
     inside = int(last - first)
-    if inside < few or ordered.size - last > 0.1 * inside or first == 0:
+    if inside < few or ordered.size - last > NEGLIGIBLE * inside or first == 0:
         return None
     next_lower = ordered[first - 1]
     beneath = int(first - np.searchsorted(ordered, next_lower))

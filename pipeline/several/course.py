@@ -15,7 +15,6 @@ from pipeline.numerics.levels import FEWEST_FOR_MEDIAN, NEGLIGIBLE, OUTLIER, cov
 from pipeline.numerics.robust import mad_sigma
 from pipeline.several.compare import Comparison, SpringRun, compare_springs
 
-FEW = FEWEST_FOR_MEDIAN + 1  # minimum number of runs in a group: the others without one run have a median
 # Maximum number of runs compared as those of one bench, which takes 0.3 s as measured if they disagree; of a larger
 # group only far runs are named.
 LARGEST_BENCH = 50
@@ -205,7 +204,7 @@ def judged(runs: Sequence[CourseRun]) -> tuple[tuple[Suspect, ...], tuple[Disagr
                 (run for run in good if run.spring == one.spring),
                 key=lambda run: run.bench not in (one.bench, two.bench),
             )
-            comparison = _compared([one, two, *mates[:FEW]])
+            comparison = _compared([one, two, *mates[: FEWEST_FOR_MEDIAN + 1]])
             if comparison is not None and set(comparison.exchanged) == {one.name, two.name}:
                 exchange(one.name, two.name, "the others")
     return tuple(found[run.name] for run in runs if run.name in found), tuple(disagreements)
@@ -222,7 +221,11 @@ def _compared(runs: Sequence[CourseRun]) -> Comparison | None:
 
 def _odd_one(runs: Sequence[CourseRun]) -> CourseRun | None:
     """Return the only run without which the others, three or more, agree."""
-    without = [_compared([other for other in runs if other is not run]) for run in runs] if len(runs) >= FEW else []
+    without = (
+        [_compared([other for other in runs if other is not run]) for run in runs]
+        if len(runs) > FEWEST_FOR_MEDIAN
+        else []
+    )
     odd = [run for run, others in zip(runs, without, strict=False) if others is not None and others.agree]
     return odd[0] if len(odd) == 1 else None
 
@@ -259,7 +262,7 @@ def _far(runs: Sequence[CourseRun]) -> dict[str, Suspect]:
             scatter = max(mad_sigma(logs - middle), least)
             for (name, value), log in zip(group, logs.tolist(), strict=True):
                 away = (log - middle) / math.hypot(scatter, value.u / value.value)
-                if len(group) >= FEW and abs(away) > OUTLIER:
+                if len(group) > FEWEST_FOR_MEDIAN and abs(away) > OUTLIER:
                     ratio = math.exp(log - middle)
                     off = f"{ratio:.3g} times" if abs(log - middle) > 1.0 else f"{100.0 * (ratio - 1.0):+.3g} % off"
                     found.setdefault(name, Suspect(name, f"its {words} is {off} that of {others}: {advice}"))

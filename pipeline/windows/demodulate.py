@@ -92,8 +92,8 @@ def demodulate(samples: Samples, cycles: Cycles) -> Windows:
     rough = retune(windows, solve(basis, windows.usable), tuning.angular_frequency, degree=1)
     basis = windows.decaying(basis, rough.decay)
     solution, spread = _ignore_clusters(windows, basis, samples.noise)
-    _rescue(windows, basis, solution, spread, tuning)
-    _clip(windows, basis, solution, spread, rough)
+    solution, spread = _rescue(windows, basis, solution, spread, tuning)
+    solution = _clip(windows, basis, solution, spread, rough)
     weights = solution.weights
     if samples.clipped_from:
         level = _typical(_spread(windows.usable, solution.residual), windows, solution)
@@ -104,8 +104,7 @@ def demodulate(samples: Samples, cycles: Cycles) -> Windows:
     tuning = retune(windows, solution, tuning.angular_frequency)
     basis = windows.basis(tuning.turning, tuning.decay)
     solution = solve(basis, weights)
-    spread = _spread(windows.usable, solution.residual)
-    _clip(windows, basis, solution, spread, tuning)
+    solution = _clip(windows, basis, solution, _spread(windows.usable, solution.residual), tuning)
     return _finish(samples, windows, solution, tuning)
 
 
@@ -136,27 +135,27 @@ def _ignore_clusters(windows: WindowSamples, basis: F8, noise: float) -> tuple[W
 
     Returns the fits and the spreads (w,) of the samples about them.
     """
-    solution = solve(basis, windows.usable.copy())  # a copy: changes of the solution must not reach the windows
+    solution = solve(basis, windows.usable)
     spread = _spread(windows.usable, solution.residual)
     odd = np.flatnonzero(spread > 1.3 * noise)
     if odd.size:
         size, least = np.abs(solution.residual[odd]), noise + windows.tiny
-        solution.put(odd, _reweighted(basis[odd], windows.usable[odd], size, 0.5, least, REWEIGHTINGS))
+        solution = solution.put(odd, _reweighted(basis[odd], windows.usable[odd], size, 0.5, least))
         spread[odd] = _spread(windows.usable[odd], solution.residual[odd])
     return solution, spread
 
 
-def _rescue(windows: WindowSamples, basis: F8, solution: WindowFits, spread: F8, tuning: Tuning) -> None:
+def _rescue(
+    windows: WindowSamples, basis: F8, solution: WindowFits, spread: F8, tuning: Tuning
+) -> tuple[WindowFits, F8]:
     """Fit windows that disagree with their neighbours again, starting from the neighbours' prediction.
-
-    The solution and its spreads are updated in place.
 
     Where half of a window consists of false echoes, its own fit may have converged to them. The amplitude, phase and
     rest position of the surrounding windows show which half to believe.
     """
     n = len(windows.y)
-    if n < 5:
-        return
+    if n < FEWEST_FOR_LINE:
+        return solution, spread
     # The phases are referred to one instant, so that medians are taken of slowly varying quantities.
     turning = np.exp(1j * tuning.angular_frequency * (windows.centre - windows.centre[0]))
     steady = (solution.coefficients[:, 1] + 1j * solution.coefficients[:, 2]) / turning
@@ -171,24 +170,25 @@ def _rescue(windows: WindowSamples, basis: F8, solution: WindowFits, spread: F8,
     few = before < 0.7 * windows.usable.sum(axis=1)
     odd = np.flatnonzero((away > OUTLIER * mad_sigma(away)) | few | ~solution.good)
     if not odd.size:
-        return
+        return solution, spread
     part, usable = basis[odd], windows.usable[odd]
     size = np.abs(part[:, 3] - (expected[odd, None, :] @ part[:, :3])[:, 0])
     # Only the best samples set the scale, so that echoes may make up more than half of a window.
-    trial = _reweighted(part, usable, size, MINORITY, level, REWEIGHTINGS)
+    trial = _reweighted(part, usable, size, MINORITY, level)
     after = np.sum((np.abs(trial.residual) <= bound) * usable, axis=1)
     better = trial.good & ((after > before[odd]) | ~solution.good[odd])
-    solution.put(odd[better], trial, better)
+    spread = spread.copy()
     spread[odd[better]] = _spread(usable[better], trial.residual[better])
+    return solution.put(odd[better], trial, better), spread
 
 
-def _reweighted(basis: F8, usable: F8, size: F8, believed: float, least: float, rounds: int) -> WindowFits:
+def _reweighted(basis: F8, usable: F8, size: F8, believed: float, least: float) -> WindowFits:
     """Fit windows with weights of Cauchy's form, :math:`(1 + (r/s)^2)^{-2}`, from residuals of a given size (w, l).
 
     The scale s is the quantile of the residuals at the share ``believed``, over that of normal deviates, but at least
     ``least``.
     """
-    for _ in range(rounds):
+    for _ in range(REWEIGHTINGS):
         spread = np.maximum(quantile(size, usable, believed) / normal_quantile(believed), least)
         solution = solve(basis, usable / (1.0 + (size / spread[:, None]) ** 2) ** 2)
         size = np.abs(solution.residual)
@@ -214,14 +214,14 @@ def _typical(spread: F8, windows: WindowSamples, solution: WindowFits) -> float:
     return max(median(spread[solution.good]) if solution.good.any() else 0.0, windows.tiny)
 
 
-def _clip(windows: WindowSamples, basis: F8, solution: WindowFits, spread: F8, tuning: Tuning) -> None:
+def _clip(windows: WindowSamples, basis: F8, solution: WindowFits, spread: F8, tuning: Tuning) -> WindowFits:
     """Exclude samples with residuals beyond the clipping bound and fit again."""
     level = _typical(spread, windows, solution)
     # One window's spread is uncertain, and a cluster of echoes widens it, so it is kept near the record's.
     size = np.hypot(solution.coefficients[:, 1], solution.coefficients[:, 2])
     least = model_error(size, tuning.decay, tuning.angular_frequency)
     bound = CLIP_SIGMAS * np.maximum(np.clip(spread, 0.75 * level, 2.0 * level), least)
-    refit(basis, solution, np.where(np.abs(solution.residual) <= bound[:, None], windows.usable, 0.0))
+    return refit(basis, solution, np.where(np.abs(solution.residual) <= bound[:, None], windows.usable, 0.0))
 
 
 def model_error(amplitude: F8, decay: F8, angular_frequency: float) -> F8:

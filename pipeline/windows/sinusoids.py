@@ -113,10 +113,14 @@ class WindowFits:
         """(w,): sum of the variances of a and b for samples of variance 1; 0 where the window is not good."""
         return np.asarray(np.trace(self.inverse[:, 1:, 1:], axis1=1, axis2=2))
 
-    def put(self, rows: NDArray[np.int64], other: WindowFits, which: slice | NDArray[np.bool_] = slice(None)) -> None:
-        """Replace the fits of some windows by selected ones of another solution."""
-        for each in fields(self):
-            getattr(self, each.name)[rows] = getattr(other, each.name)[which]
+    def put(
+        self, rows: NDArray[np.int64], other: WindowFits, which: slice | NDArray[np.bool_] = slice(None)
+    ) -> WindowFits:
+        """Return these fits with some windows' replaced by selected ones of another solution."""
+        changed = {each.name: getattr(self, each.name).copy() for each in fields(self)}
+        for name, values in changed.items():
+            values[rows] = getattr(other, name)[which]
+        return WindowFits(**changed)
 
 
 def solve(basis: F8, weights: F8) -> WindowFits:
@@ -138,11 +142,10 @@ def solve(basis: F8, weights: F8) -> WindowFits:
     return WindowFits(coefficients, sums[:, :, :3], residual, good, weights)
 
 
-def refit(basis: F8, solution: WindowFits, weights: F8) -> None:
-    """Update a solution, in place, for new weights; windows with unchanged weights are not fitted again."""
+def refit(basis: F8, solution: WindowFits, weights: F8) -> WindowFits:
+    """Return a solution for new weights; windows with unchanged weights are not fitted again."""
     changed = np.flatnonzero((weights != solution.weights).any(axis=1))
-    if changed.size:
-        solution.put(changed, solve(basis[changed], weights[changed]))
+    return solution.put(changed, solve(basis[changed], weights[changed])) if changed.size else solution
 
 
 def quantile(size: F8, usable: F8, share: float) -> F8:

@@ -28,9 +28,9 @@ from springmass.commands.options import (
     Scenes,
     Strict,
 )
-from springmass.commands.parameters import Finite, argument, flag, option, output
-from springmass.commands.questions import for_command, option_words
-from springmass.errors import HINT, LOG, OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError
+from springmass.commands.parameters import Finite, PartsPerMillion, argument, flag, option, output
+from springmass.commands.questions import for_one
+from springmass.errors import HINT, LOG, OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, of_several
 from springmass.layout import STDIN
 from springmass.loading.inputs import files_of
 from springmass.loading.notes import keep_answers
@@ -54,6 +54,9 @@ class AnalyseOptions:
     scene: Scenes = ()
     from_s: Annotated[Finite | None, option("S", "use samples from this time on, s", "--from")] = None
     to_s: Annotated[Finite | None, option("S", "use samples up to this time, s", "--to")] = None
+    clock_ppm: Annotated[
+        PartsPerMillion | None, option("PPM", "largest rate error of the sensor's clock (default: that of its family)")
+    ] = None
     method: Annotated[
         Literal["classic"] | None,
         option("NAME", "also apply the lab report's classic method, for comparison"),
@@ -85,7 +88,8 @@ def analyse(
 ) -> int:
     """Analyse every input; if one fails, the others still give results."""
     inputs = [str(each) for each in recordings]
-    how = analysis.of(read, method=options.method, from_s=options.from_s, to_s=options.to_s)
+    own = {name: getattr(options, name) for name in ("from_s", "to_s", "clock_ppm", "method")}
+    how = analysis.of(read, **own)
     if options.keep and (not read.about_the_file().given() or STDIN in inputs):
         raise ProgramError("--keep keeps options of reading such as --unit next to a file", "give one, and the file")
     if how.velocity is not None and (len(inputs) > 1 or Path(inputs[0]).is_dir()):
@@ -148,9 +152,8 @@ def _several(
     if len(runs) > 1:
         named = shlex.join(inputs)
         LOG.log(HINT, f"springmass compare {named if len(named) <= LONGEST_INPUTS else '...'}")
-    if len(set(codes)) > 1 and any(code not in (OK, REJECTED) for code in codes):
-        return SOME_FAILED
-    return max(*codes, written)
+    code = of_several(codes)
+    return code if code == SOME_FAILED else max(code, written)
 
 
 def _keep(runs: Sequence[Run], read: LoadOptions, options: AnalyseOptions) -> None:
@@ -165,12 +168,8 @@ def _keep(runs: Sequence[Run], read: LoadOptions, options: AnalyseOptions) -> No
 
 def _failed(failed: Failed) -> int:
     """Say why a recording gives no run; the remedy of a question names the command for this recording alone."""
-    task, message = failed.task, str(failed.error)
-    if failed.question is not None:
-        path = f"./{task.source}" if task.source.startswith("-") else task.source
-        words = ["springmass", "analyse", path, *option_words(task.how.given())]
-        message = str(failed.question.with_remedy(for_command(failed.question.question, words)))
-    LOG.warning(message)
+    task, asked = failed.task, failed.question
+    LOG.warning(failed.error if asked is None else for_one(asked, "analyse", task.source, task.how.given()))
     return failed.error.exit_code
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Group, Parameter, Token
 
 from acquisition.recordings.reading import ReadOptions, ValueKind, value_of
-from springmass.commands.parameters import LawName, PartsPerMillion, Positive, TcpPort, argument, flag, option
+from springmass.commands.parameters import LawName, Positive, TcpPort, argument, flag, option
 from springmass.errors import ProgramError
 from springmass.loading.options import LOAD_FIELDS, Accuracy, AnalysisOptions, LoadOptions
 
@@ -186,9 +186,6 @@ class ReadPairs:
 class AnalysisArguments:
     """The options of an analysis as the command line has them, each with its words."""
 
-    clock_ppm: Annotated[
-        PartsPerMillion | None, option("PPM", "largest rate error of the sensor's clock (default: that of its family)")
-    ] = None
     accuracy: Annotated[Accuracy, option("TIER", "how much time to spend on accuracy (default: standard)")] = "standard"
     law: LawName = None
 

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 
 from cyclopts.argument import Argument
 
+from acquisition.errors import NeedsAnswer
 from acquisition.recordings.questions import Question
 from springmass.api.questions import is_given
 
@@ -72,6 +73,12 @@ def for_command(question: Question, words: Sequence[str]) -> str:
         elif pair[-1].removeprefix("--read=").partition("=")[0].replace("-", "_") not in missing:
             line += pair
     return " ".join(map(quoted, [*line, *pair_words(question.examples), *words[end:]]))
+
+
+def for_one(error: NeedsAnswer, command: str, path: str, answers: Mapping[str, object]) -> NeedsAnswer:
+    """Return the question about one of several inputs, with a command line for this input alone."""
+    path = f"./{path}" if path.startswith("-") else path
+    return error.with_remedy(for_command(error.question, ["springmass", command, path, *option_words(answers)]))
 
 
 def _arguments_of(command: str) -> list[Argument]:

@@ -9,7 +9,7 @@ from typing import Annotated
 from acquisition.errors import visible
 from springmass.commands.options import FileArgument, FileArguments, converted
 from springmass.commands.parameters import argument, option
-from springmass.errors import HINT, LOG, OK, ProgramError
+from springmass.errors import HINT, LOG, OK, UNREADABLE, ProgramError, of_several
 from springmass.loading.inputs import files_of
 from springmass.loading.options import LoadOptions
 
@@ -77,11 +77,13 @@ def scene(
     read: FileArguments = FileArguments(),
 ) -> int:
     """Print the template, check a scene, or note scene, remarks and marks beside a recording."""
+    from acquisition.errors import AcquisitionError, NeedsAnswer
     from pipeline.bench.scene import Scene
-    from springmass.commands.questions import quoted
+    from springmass.commands.questions import for_one, quoted
     from springmass.loading.load import load
     from springmass.loading.notes import about_of, keep_answers, write_about
     from springmass.loading.scenes import ask_about, read_scene, stated_keys
+    from storage.errors import StorageError
 
     answers = read.given()
     noted = scene is not None or note or mark or answers
@@ -109,19 +111,29 @@ def scene(
     files, messages = files_of([str(each) for each in recordings])
     for line in messages:
         LOG.info(line)
-    if missing := next((each.path for each in files if not Path(each.path).is_file()), None):
-        raise ProgramError(f"{missing}: expected a recording, got none", "check the name")
     stated = None if scene is None else read_scene(scene)
-    opened = []
-    for each in files if answers else ():  # all are read before any notes are written
-        loaded = load(each.path, LoadOptions(**({"velocity": each.velocity} | answers)))
-        opened.append((Path(each.path), loaded.sha256))
-    for path, sha256 in opened:
-        keep_answers(path, answers, sha256)
-    for path in (Path(each.path) for each in files):
+
+    def save(path: Path, velocity: str | None) -> None:
+        if not path.is_file():
+            raise ProgramError(f"{path}: expected a recording, got none", "check the name")
+        if answers:
+            loaded = load(path, LoadOptions(**({"velocity": velocity} | answers)))
+            keep_answers(path, answers, loaded.sha256)
         about = about_of(path)
         if stated is not None or note or mark:
             write_about(about.with_more(stated, note, mark))
         LOG.info(f"{about.path}: used from now on with {path.name}")
-    LOG.log(HINT, f"springmass analyse {' '.join(shlex.quote(str(each)) for each in recordings)}")
-    return OK
+
+    codes = []
+    for each in files:
+        try:
+            save(Path(each.path), each.velocity)
+            codes.append(OK)
+        except (ProgramError, AcquisitionError, StorageError) as error:
+            if len(files) == 1:
+                raise
+            LOG.warning(for_one(error, "scene", each.path, answers) if isinstance(error, NeedsAnswer) else error)
+            codes.append(error.exit_code if isinstance(error, ProgramError) else UNREADABLE)
+    if OK in codes:
+        LOG.log(HINT, f"springmass analyse {' '.join(shlex.quote(str(each)) for each in recordings)}")
+    return of_several(codes)

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from multiprocessing import active_children, get_context, parent_process
 from typing import Any, TypeVar
 
-from springmass.errors import SOME_FAILED, ProgramError, at_level, print_messages
+from springmass.errors import LOG, SOME_FAILED, ProgramError, at_level, print_messages
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -59,6 +59,7 @@ class _ThisProcess(Executor):
 def workers(tasks: int, processes: int | None = None, dask: str | None = None) -> Iterator[Workers]:
     """Yield those of a dask cluster, or processes of this machine, by default one per core."""
     number = min(processes or cores(), tasks)
+    LOG.debug(f"processes: {number}" if dask is None else f"workers of {dask}")
     if dask is not None:
         with _dask(dask) as cluster:
             yield cluster

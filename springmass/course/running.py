@@ -86,7 +86,7 @@ def _analysed(
         for done in outcomes(partial(analyse_one, remedy=remedy), todo, by):
             rows = [(key_of(task), row or blank_row(task, "ended", f"{task.name}: {_DIED}")) for task, row in done]
             if any(row["software"] != software() for _, row in rows):
-                wrong = f"{dask}: a worker has another version of springmass or of its libraries"
+                wrong = f"{dask or 'this machine'}: a worker has another version of springmass or of its libraries"
                 raise ProgramError(wrong, "install the same everywhere")
             yield rows
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 from acquisition.block import Block, SourceInfo
@@ -31,22 +31,19 @@ def to_track(
     The noise stated by a source is passed on. The error column of a file is not noise and is passed on separately.
     """
     facts = provenance or {}
+    # But for its name, a track states what a source states under the same names.
+    of_source = {**asdict(info), "u_rate": info.u_rate or 0.0}
+    del of_source["name"]
     moments = [t_s for t_s, event in recorded_events(facts) if isinstance(event.typed, Triggered)]
     return Track(
         t=samples.t,
         y=samples.distance,
         flags=samples.flags,
-        rate_hz=info.rate_hz,
-        sigma_m=info.sigma_m,
-        quantum_m=info.quantum_m,
-        stated_error_m=info.stated_error_m,
-        clock=info.clock,
-        kind=info.kind,
+        **of_source,
         velocity=samples.velocity,
         quantity=samples.quantity,
         unit=samples.unit,
         trigger_s=float(moments[0]) if moments else None,  # when the bob left its rest position
-        u_rate=info.u_rate or 0.0,
         **_clock_comparison(samples, info, facts),
         **_scale(recorded_format, facts.get("sensor") or {}),
     )

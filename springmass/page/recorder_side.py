@@ -104,11 +104,13 @@ class PageProcess:
                 page.flush()
 
     def _listen(self, process: subprocess.Popen[bytes]) -> None:
-        for line in process.stdout or ():
-            try:
-                self._take(json.loads(line))
-            except (ValueError, KeyError, TypeError) as error:
-                self._failures.note("page", error)
+        assert process.stdout is not None
+        with process.stdout as lines:
+            for line in lines:
+                try:
+                    self._take(json.loads(line))
+                except (ValueError, KeyError, TypeError) as error:
+                    self._failures.note("page", error)
         code = process.wait()
         if not self._over:
             self._lost(ChildProcessError(f"its process ended with {code}"))

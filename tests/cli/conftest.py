@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+import logging
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +17,7 @@ import pytest
 
 import springmass
 from springmass.cli import main
+from springmass.errors import LOG
 
 TITLE = b"Motion Sensor Data File Mar 12, 2024 2:05 PM"
 COLUMNS = b"Time (s)\tDistance (cm)\tDist Error (cm)"
@@ -46,8 +52,46 @@ constant_n_per_m = 20.0
 displacement_m = 0.05
 """
 MIXED = f"{BENCH}[damping]\ngamma_per_s = 0.0073\nbeta_per_m_s = 0.235\n"
+VIEWED_S = 60.0
+"""The longest time until a page shows its motion."""
 Cli = Callable[..., Any]
 """What calls a command line, and returns a `Done`."""
+
+
+class Viewer(logging.Handler):
+    """Looks at a page once its address is printed, and ends the program as Ctrl-C does."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.seen: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Begin to look where a message has the address."""
+        if (line := record.getMessage()).startswith("page: http"):
+            threading.Thread(target=self._look, args=(line.removeprefix("page: "),)).start()
+
+    def _look(self, address: str) -> None:
+        from tests.pages.bench import Client  # it imports playwright, which few of these tests need
+
+        try:
+            with Client(address).socket() as messages:
+                until = time.monotonic() + VIEWED_S
+                while time.monotonic() < until:
+                    message = messages.recv(timeout=VIEWED_S)
+                    if isinstance(message, str) and '"estimates"' in message:
+                        self.seen.append(message)
+                        break
+        finally:
+            os.kill(os.getpid(), signal.SIGINT)
+
+
+@pytest.fixture
+def viewer() -> Iterator[Viewer]:
+    """Return what has looked at the pages of a test, each of which ends once it was seen."""
+    seeing = Viewer()
+    LOG.addHandler(seeing)
+    yield seeing
+    LOG.removeHandler(seeing)
 
 
 @pytest.fixture

@@ -52,6 +52,21 @@ def test_no_answers_are_kept_that_do_not_open_the_file(cli: Cli, bob: Path) -> N
     assert [each.name for each in bob.parent.iterdir()] == ["bob.csv"]
 
 
+def test_a_file_that_does_not_open_does_not_stop_the_others(cli: Cli, bob: Path) -> None:
+    """A line says why for each; the exit code is that of several inputs, some of which failed."""
+    absent, diary, other = (bob.with_name(name) for name in ("absent.csv", "diary.txt", "other.csv"))
+    diary.write_text("Dear diary\n")
+    other.write_bytes(bob.read_bytes())
+    done = cli("scene", absent, bob, diary, other, "--unit", "cm", "--rate-hz", "100")
+    assert done.code == 1
+    assert [line for line in done.err.splitlines() if line.startswith(f"springmass: {absent}")]
+    assert [line for line in done.err.splitlines() if line.startswith(f"springmass: {diary}")]
+    assert notes_of(bob)["unit"] == notes_of(other)["unit"] == "cm"
+    asked = cli("scene", bob, other, "--unit", "cm", "--channel", "nope")
+    assert asked.code == 3
+    assert asked.err.count("? springmass scene") == 2
+
+
 def test_an_analysis_keeps_its_answers(cli: Cli, bob: Path) -> None:
     """A changed file is said to be newer than its answers; a run file states them among its provenance."""
     assert cli("analyse", bob, "--unit", "cm", "--rate-hz", "100", "--no-report", "--keep").code == 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from springmass.loading.load import sample_data
-from tests.cli.conftest import Cli
+from tests.cli.conftest import Cli, Viewer
 
 
 @pytest.fixture
@@ -91,6 +92,24 @@ def test_several_files_are_asked_for_notes(cli: Cli, table: Path) -> None:
     _, *suggested = shlex.split(done.complaint[done.complaint.index("? springmass ") + 2 :])
     assert cli(*suggested).code == 0
     assert cli(*typed).code == 0
+
+
+def test_a_course_is_asked_for_pairs_that_work(cli: Cli, table: Path, tmp_path: Path) -> None:
+    """The words in the message, behind those that were typed, answer for all recordings."""
+    typed = ("batch", table, "-o", tmp_path / "course", "--jobs", "1", "--reports", "0")
+    done = cli(*typed)
+    assert done.code == 3
+    (words,) = re.findall(r"give batch (--read .*) for all recordings", done.err)
+    assert cli(*typed, *shlex.split(words)).code == 0
+
+
+def test_the_page_is_asked_for_a_line_that_works(cli: Cli, table: Path, viewer: Viewer) -> None:
+    """It shows the run; without what the line adds there is no page."""
+    done = cli("page", table, "--no-browser")
+    assert (done.code, viewer.seen) == (3, [])
+    _, *suggested = shlex.split(done.complaint[done.complaint.index("? springmass ") + 2 :])
+    assert cli(*suggested).code == 0
+    assert "estimates" in viewer.seen[0]
 
 
 def test_each_of_several_inputs_is_asked_for_alone(cli: Cli, table: Path) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from acquisition.block import B1, F8, I8, U8, Flag
 from acquisition.recordings.recording import FormatIssue
-from acquisition.recordings.sampling.timing import ChannelRows, Grid, Timing, median, snap
+from acquisition.recordings.sampling.timing import ChannelRows, Timing, median, snap
 
 IRREGULAR = np.uint8(Flag.DUPLICATE_TIME | Flag.NON_MONOTONIC_TIME)
 UNREAD_FLAGS = np.uint8(Flag.MALFORMED | Flag.MISSING)
@@ -22,7 +22,7 @@ _ZEROS = 10
 _BACKWARD = "run backward or ahead of their neighbours"
 
 
-def place_unread(t: F8, unread: B1, grid: Grid | None) -> F8:
+def place_unread(t: F8, unread: B1, timing: Timing) -> F8:
     """Return the times of all rows; NaN for an unread row if nothing shows that it was a sample.
 
     An unread row has a time if the unread rows exactly fill the grid between two others, or if its printed time (a NaN
@@ -33,17 +33,17 @@ def place_unread(t: F8, unread: B1, grid: Grid | None) -> F8:
     for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         printed_times = t[start:stop]
         before, after = t[start - 1] if start else -np.inf, t[stop] if stop < t.size else np.inf
-        if grid is None:
+        if timing.origin_s is None:
             out[start:stop] = np.where(
                 np.isfinite(after - before) & (before < printed_times) & (printed_times < after), printed_times, np.nan
             )
             continue
         # As numbers of steps of the grid: the printed time, and what the rows above and below predict.
-        first, printed, last = ((each - grid.origin_s) * grid.rate_hz for each in (before, printed_times, after))
+        first, printed, last = (timing.steps(each) for each in (before, printed_times, after))
         above, below = first + 1 + np.arange(printed_times.size), last - 1 - np.arange(printed_times.size)[::-1]
         fills = np.abs(above - below) < 0.5
         alike = (np.abs(printed - above) < 0.5) | (np.abs(printed - below) < 0.5)
-        out[start:stop] = np.where(fills | alike, grid.time(np.rint(np.where(fills, above, printed))), np.nan)
+        out[start:stop] = np.where(fills | alike, timing.time(np.rint(np.where(fills, above, printed))), np.nan)
     return out
 
 
@@ -73,16 +73,16 @@ def place(rows: ChannelRows, timing: Timing) -> F8:
 
     The time of an unread row is inferred if possible, else NaN. The array of printed times may be overwritten.
     """
-    unread, t, grid = rows.unread, rows.printed, timing.grid
-    if grid is not None and (timing.by_row or t is None):
-        t = grid.time(rows.numbers)
+    unread, t, on_grid = rows.unread, rows.printed, timing.origin_s is not None
+    if on_grid and (timing.by_row or t is None):
+        t = timing.time(rows.numbers)
         t[rows.remark] = np.nan
         return t
     if t is None:
         raise ValueError("without times only a grid has times of rows")
-    if grid is not None:
-        t[~unread] = snap(t[~unread], grid, timing.resolution_s)[0]
-    return place_unread(t, unread, grid) if unread.any() else t
+    if on_grid:
+        t[~unread] = snap(t[~unread], timing, timing.resolution_s)[0]
+    return place_unread(t, unread, timing) if unread.any() else t
 
 
 def row_traps(rows: ChannelRows, timed: B1, zeros: int) -> Iterator[FormatIssue]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,28 +27,40 @@ _REGULAR_INTERVALS = 0.9  # minimum share of intervals that differ from the medi
 _SAME_TIME = 3.0  # minimum rows per burst if all its rows have the same time; two rows may be two sensors
 
 
-class Grid(NamedTuple):
-    """Times ``origin_s + i / rate_hz`` for integer i."""
+class Timing(NamedTuple):
+    """The times ``origin_s + i / rate_hz`` of samples i; without an origin they fit no grid and are used as printed.
+
+    ``by_row`` says that times computed from row numbers are better than the printed times. ``traps`` say how the times
+    were obtained.
+    """
 
     rate_hz: float
-    origin_s: float = 0.0
+    origin_s: float | None
+    resolution_s: float = 0.0
+    by_row: bool = False
+    traps: tuple[FormatIssue, ...] = ()
+
+    def steps(self, t: Any) -> Any:
+        """Return a time, or an array of times, as numbers of steps from the origin."""
+        return (t - (self.origin_s or 0.0)) * self.rate_hz
 
     def nearest(self, t: F8) -> I8:
         """Return the index i of the grid point nearest to each time."""
-        return np.rint((t - self.origin_s) * self.rate_hz).astype(np.int64)
+        nearest: I8 = np.rint(self.steps(t)).astype(np.int64)
+        return nearest
 
     def time(self, index: I8) -> F8:
         """Return the time of each index i, s."""
         return self.origin_s + index / self.rate_hz if self.origin_s else index / self.rate_hz
 
 
-def find_rate(t: F8, resolution: float, rate_hz: float | None = None) -> tuple[float, float, Grid | None, bool] | None:
+def find_rate(t: F8, resolution: float, rate_hz: float | None = None) -> tuple[Timing, float, bool] | None:
     """Infer the rate from printed times (s) with a last digit of ``resolution``; None without two different times.
 
     Times may repeat, run backward or be missing. If the rate is known, only grids of this rate are tried. Return the
-    rate in Hz, the relative half-width of the range of rates that are compatible with the rounding of the times, the
-    grid from which the times were rounded, or None if they fit no grid, and whether the rate is certain: no grid with
-    a rate one hertz higher or lower fits equally well.
+    rate in Hz with the origin of the grid from which the times were rounded, the relative half-width of the range of
+    rates that are compatible with the rounding of the times, and whether the rate is certain: no grid with a rate one
+    hertz higher or lower fits equally well.
     """
     times = t if (t[1:] > t[:-1]).all() else np.unique(t[np.isfinite(t)])
     if times.size < 2:
@@ -61,19 +73,19 @@ def find_rate(t: F8, resolution: float, rate_hz: float | None = None) -> tuple[f
     rates = dict.fromkeys(float(f) for f in tried if f and abs(f - rough) <= rough * relative_u * 1.5 + 1e-9)
     probe = _probe(times)
 
-    def share(grid: Grid) -> float:
+    def share(grid: Timing) -> float:
         return float(np.mean(snap(probe, grid, resolution)[1]))
 
     for origin in (0.0, float(times[0])):
-        grids = [Grid(rate, origin) for rate in rates]
+        grids = [Timing(rate, origin, resolution) for rate in rates]
         # Consecutive times must usually lie at consecutive grid points.
         shares = {grid: share(grid) for grid in grids if median(np.diff(grid.nearest(times[:_PROBE]))) == 1.0}
         best = max(shares, key=lambda grid: shares[grid], default=None)
         if best is not None and shares[best] > _SHARE_ON_GRID:
-            beside = (Grid(rate, origin) for rate in (best.rate_hz - 1.0, best.rate_hz + 1.0) if rate > 0)
+            beside = (Timing(rate, origin) for rate in (best.rate_hz - 1.0, best.rate_hz + 1.0) if rate > 0)
             near = [grid for grid in beside if abs(grid.rate_hz - rough) <= 1.5 * rough * relative_u]
-            return best.rate_hz, relative_u, best, all(share(grid) < shares[best] for grid in near)
-    return rough, relative_u, None, False
+            return best, relative_u, all(share(grid) < shares[best] for grid in near)
+    return Timing(rough, None, resolution), relative_u, False
 
 
 def median(values: NDArray[np.number]) -> float:
@@ -108,7 +120,7 @@ def _mean_step(apart: F8, resolution: float) -> tuple[float, float]:
     return step, relative_u
 
 
-def snap(t: F8, grid: Grid, resolution: float) -> tuple[F8, B1]:
+def snap(t: F8, grid: Timing, resolution: float) -> tuple[F8, B1]:
     """Replace each time by the nearest grid point if the two agree within the rounding of the printed time.
 
     Return the times and a mask of those that agree.
@@ -152,20 +164,6 @@ class ChannelRows:
         return np.cumsum(~self.remark) - 1
 
 
-class Timing(NamedTuple):
-    """Rate and grid of a file's times; no grid if the times fit none and are used as printed.
-
-    ``by_row`` says that times computed from row numbers are better than the printed times. ``traps`` say how the times
-    were obtained.
-    """
-
-    rate_hz: float
-    grid: Grid | None
-    resolution_s: float
-    by_row: bool = False
-    traps: tuple[FormatIssue, ...] = ()
-
-
 def rate_needed(instead: MissingItem | None = None) -> MissingItem:
     """Return the missing item for a rate; a column of times may be given instead."""
     return MissingItem(Missing.RATE_HZ, (), _ANY_RATE_HZ, instead=instead)
@@ -200,7 +198,7 @@ def find_timing(path: str, rows: ChannelRows, formula: Formula | None, rate_hz: 
         if rate_hz is None:
             reason = "no column of times and no sampling interval"
             raise NeedsAnswer(Question(path, (rate_needed(),), reason=reason))
-        timing = Timing(rate_hz, Grid(rate_hz), 0.0, by_row=True, traps=_nominal(rate_hz))
+        timing = Timing(rate_hz, 0.0, by_row=True, traps=_nominal(rate_hz))
     given = () if rate_hz is None else (FormatIssue("rate_given", f"you stated the sampling rate: {rate_hz:g} Hz"),)
     return timing._replace(traps=(*traps, *timing.traps, *given))
 
@@ -227,7 +225,7 @@ def _by_formula(path: str, formula: Formula, rows: ChannelRows, rate_hz: float |
     if rate_hz is not None and abs(rate - rate_hz) > 1e-6 * rate:
         problem = f"rate_hz must agree with the header, {rate:.6g} Hz, got {rate_hz:g}"
         raise FormatError(path, problem, "leave the rate out or correct it")
-    return Timing(rate, Grid(rate, start_s), 0.0, by_row=True, traps=_nominal(rate))
+    return Timing(rate, start_s, by_row=True, traps=_nominal(rate))
 
 
 def _by_column(path: str, printed: F8, resolution: float, rate_hz: float | None) -> Timing:
@@ -238,23 +236,23 @@ def _by_column(path: str, printed: F8, resolution: float, rate_hz: float | None)
             reason = f"expected different times, got {printed.size} rows at one time"
             raise NeedsAnswer(Question(path, (rate_needed(),), reason=reason))
         origin = float(printed[0]) if printed.size else 0.0
-        return Timing(rate_hz, Grid(rate_hz, origin), resolution, traps=_nominal(rate_hz))
-    rate, relative_u, grid, certain = fitted
-    jitter = None if grid is not None else _jitter(printed)
+        return Timing(rate_hz, origin, resolution, traps=_nominal(rate_hz))
+    timing, relative_u, certain = fitted
+    rate, on_grid = timing.rate_hz, timing.origin_s is not None
+    jitter = None if on_grid else _jitter(printed)
     if rate_hz is not None:
         allowed = rate_hz * (1.5 * relative_u + 1e-6 + (0.01 if jitter else 0.0))
         if abs(rate - rate_hz) > allowed:
             problem = f"rate_hz must agree with the times, {rate:.6g} Hz, got {rate_hz:g}"
             raise FormatError(path, problem, "leave the rate out or correct it")
-        return Timing(rate_hz, grid, resolution, traps=_nominal(rate_hz) if grid else ())
-    if grid is None:
+        return timing._replace(rate_hz=rate_hz, traps=_nominal(rate_hz) if on_grid else ())
+    if not on_grid:
         measured = f"are measured: their steps vary from {jitter}"
         times = measured if jitter else "fit no regular grid and are used as printed"
-        traps = (FormatIssue("jittered_time", f"the times {times} ({rate:.6g} Hz on average)"),)
-        return Timing(rate, None, resolution, traps=traps)
+        return timing._replace(traps=(FormatIssue("jittered_time", f"the times {times} ({rate:.6g} Hz on average)"),))
     likely = f"the rate of {rate:g} Hz is the most likely one: there are too few rows to be certain"
     assumed = () if certain else (FormatIssue("rate_assumed", likely),)
-    return Timing(rate, grid, resolution, traps=(*_nominal(rate), *assumed))
+    return timing._replace(traps=(*_nominal(rate), *assumed))
 
 
 def _jitter(printed: F8) -> str:
@@ -301,4 +299,4 @@ def _in_bursts(path: str, t: F8, resolution: float, rate_hz: float | None) -> Ti
         raise NeedsAnswer(Question(path, (rate_needed(),), reason=f"the times come in {bursts}, some missing"))
     rate = rate_hz or 1.0 / step
     message = f"the times come in {bursts}; the samples were spread evenly, at {rate:.6g} Hz"
-    return Timing(rate, Grid(rate, start), resolution, by_row=True, traps=(FormatIssue("times_in_bursts", message),))
+    return Timing(rate, start, resolution, by_row=True, traps=(FormatIssue("times_in_bursts", message),))

@@ -51,7 +51,7 @@ class Samples:
         kind: SourceKind = (
             "simulated" if says_simulated(f"{table.title} {table.run} {column.name} {name}") else "replay"
         )
-        clock: ClockKind = "device" if self.timing.grid is None else "nominal"
+        clock: ClockKind = "device" if self.timing.origin_s is None else "nominal"
         return Recording(
             format=family,
             path=self.path,

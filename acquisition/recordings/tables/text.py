@@ -111,6 +111,8 @@ def restated(path: str, data: bytes, delimiter: str | None, decimal: str | None)
         mark = ","
     lines = text.split("\n")
     if mark:
+        if mark != " " and mark not in text:
+            raise FormatError(path, f"the delimiter {delimiter} is not in the file", "state that of the file")
         cells = rf'{re.escape(mark)}(?=(?:[^"]*"[^"]*")*[^"]*$)' if mark != " " else r"\s+"
         lines = ["\t".join(re.split(cells, line.strip(" "))) for line in lines]
     if decimal == ",":

@@ -21,7 +21,9 @@ from pipeline.quantities import QUANTITIES
 from pipeline.track import F8
 from pipeline.units import Unit
 
-STEP_S = 1e-3  # time step of the difference for the rate; the relative error is a third of the squared relative change
+STEP_S = (
+    1e-3  # of the difference for the rate, s; the error by Taylor's theorem is that of Press et al. (2007), section 5.7
+)
 
 
 def make_law(

@@ -5,9 +5,13 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
+
+from springmass.api.analysing import AnalysisKeywords, ReadKeywords
+from springmass.loading.options import AnalysisOptions, LoadOptions
 
 ROOT = Path(__file__).resolve().parents[4]
 SCRIPT = """\
@@ -39,6 +43,12 @@ def test_mypy_finds_every_mistake_and_no_other(tmp_path: Path) -> None:
     found = {int(line) for line in re.findall(r"script\.py:(\d+): error", done.stdout)}
     wrong = {number for number, line in enumerate(SCRIPT.splitlines(), 1) if line.endswith("# wrong")}
     assert found == wrong, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize(("keywords", "options"), [(ReadKeywords, LoadOptions), (AnalysisKeywords, AnalysisOptions)])
+def test_a_checker_of_types_knows_every_option(keywords: type, options: type[LoadOptions]) -> None:
+    """A checker reads only a list written out, so the two lists must agree."""
+    assert keywords.__annotations__.keys() == {each.name for each in fields(options)}
 
 
 CODE = """
