@@ -107,14 +107,14 @@ def typed(text: str, unit: str) -> Estimate:
     return Estimate(float(f"{value * scale.factor + scale.zero:.15g}"), float(f"{u * scale.factor:.15g}"), unit)
 
 
-class Reading(NamedTuple):
+class UnitReading(NamedTuple):
     """A unit in which a bare number may have been read off, and how many times larger the value then is."""
 
     unit: str
     ratio: float
 
 
-def readings(value: float, unit: str, usual: tuple[float, float]) -> list[Reading]:
+def readings(value: float, unit: str, usual: tuple[float, float]) -> list[UnitReading]:
     """Return the units in which the bare number would be a usual value, those of a bench first.
 
     >>> readings(10.2, "m", (0.0, 1.0))[0].unit, readings(1005.0, "Pa", (5e4, 1.1e5))[0].unit
@@ -123,7 +123,7 @@ def readings(value: float, unit: str, usual: tuple[float, float]) -> list[Readin
     'K'
     """
     within = [
-        Reading(name, (scale.factor * value + scale.zero) / value)
+        UnitReading(name, (scale.factor * value + scale.zero) / value)
         for name, scale in scales_of(unit).items()
         if value and usual[0] <= scale.factor * value + scale.zero <= usual[1]
     ]
