@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from pipeline.bench.disc import added_mass_kg
-from pipeline.bench.scene import SCENE_KEYS, Scene
+from pipeline.bench.scene import BENCH_KEYS, Scene
 from pipeline.bench.spring import GRAVITY_M_PER_S2
 from pipeline.bench.typed import readings
 from pipeline.numerics.estimate import Estimate
@@ -43,7 +43,7 @@ def slips(scene: Scene) -> tuple[Slip, ...]:
     ['[disc] diameter_m = 10.2 is larger than a bench: 10.2 m or 10.2 cm?']
     """
     found = []
-    for (table, key), quantity in SCENE_KEYS.items():
+    for (table, key), quantity in BENCH_KEYS.items():
         estimate: Estimate | None = getattr(scene, quantity.attribute)
         if estimate is None:
             continue

@@ -23,7 +23,7 @@ _CHOICES: dict[tuple[str, str], tuple[str, Callable[[], tuple[str, ...]]]] = {
 """Keys of a scene file with text values: the attribute for each key, and what returns the allowed texts."""
 
 
-class SceneKey(NamedTuple):
+class BenchKey(NamedTuple):
     """One key of a scene file: its attribute, its unit, and its allowed range, including both ends.
 
     The ends lie far beyond any bench. The calculations are known to be valid between them, so every allowed value gives
@@ -43,28 +43,28 @@ class SceneKey(NamedTuple):
         return f"at least {self.least:g}{unit} and at most {self.greatest:g}"
 
 
-SCENE_KEYS: dict[tuple[str, str], SceneKey] = {
-    ("bob", "mass_kg"): SceneKey("bob_mass_kg", "kg", 1e-12, 1e6),
-    ("spring", "mass_kg"): SceneKey("spring_mass_kg", "kg", 0.0, 1e6),
-    ("spring", "constant_n_per_m"): SceneKey("spring_constant_n_per_m", "N/m", 1e-12, 1e12),
-    ("spring", "cubic_n_per_m3"): SceneKey("spring_cubic_n_per_m3", "N/m3", -1e18, 1e18),
-    ("pendulum", "length_m"): SceneKey("pendulum_length_m", "m", 1e-4, 1e4),
-    ("disc", "diameter_m"): SceneKey("disc_diameter_m", "m", 1e-6, 1e3),
-    ("air", "temperature_c"): SceneKey("air_temperature_c", "degC", -100.0, 200.0),
-    ("air", "pressure_pa"): SceneKey("air_pressure_pa", "Pa", 1e-3, 1e7),
-    ("air", "relative_humidity"): SceneKey("air_relative_humidity", "", 0.0, 1.0),
-    ("sensor", "sigma_m"): SceneKey("sensor_sigma_m", "m", 1e-12, 1e3),
-    ("sensor", "mean_samples"): SceneKey("sensor_mean_samples", "", 1.0, 1e4),
-    ("sensor", "lag_s"): SceneKey("sensor_lag_s", "s", 0.0, 1e3),
-    ("sensor", "clock_ppm"): SceneKey("sensor_clock_ppm", "ppm", -1e5, 1e5),
-    ("start", "displacement_m"): SceneKey("start_displacement_m", "m", -1e3, 1e3),
-    ("start", "velocity_m_per_s"): SceneKey("start_velocity_m_per_s", "m/s", -1e6, 1e6),
-    ("damping", "gamma_per_s"): SceneKey("gamma_per_s", "1/s", 0.0, 1e6),
-    ("damping", "beta_per_m_s"): SceneKey("beta_per_m_s", "1/(m s)", 0.0, 1e6),
-    ("damping", "mu_m_per_s"): SceneKey("mu_m_per_s", "m/s", 0.0, 1e6),
+BENCH_KEYS: dict[tuple[str, str], BenchKey] = {
+    ("bob", "mass_kg"): BenchKey("bob_mass_kg", "kg", 1e-12, 1e6),
+    ("spring", "mass_kg"): BenchKey("spring_mass_kg", "kg", 0.0, 1e6),
+    ("spring", "constant_n_per_m"): BenchKey("spring_constant_n_per_m", "N/m", 1e-12, 1e12),
+    ("spring", "cubic_n_per_m3"): BenchKey("spring_cubic_n_per_m3", "N/m3", -1e18, 1e18),
+    ("pendulum", "length_m"): BenchKey("pendulum_length_m", "m", 1e-4, 1e4),
+    ("disc", "diameter_m"): BenchKey("disc_diameter_m", "m", 1e-6, 1e3),
+    ("air", "temperature_c"): BenchKey("air_temperature_c", "degC", -100.0, 200.0),
+    ("air", "pressure_pa"): BenchKey("air_pressure_pa", "Pa", 1e-3, 1e7),
+    ("air", "relative_humidity"): BenchKey("air_relative_humidity", "", 0.0, 1.0),
+    ("sensor", "sigma_m"): BenchKey("sensor_sigma_m", "m", 1e-12, 1e3),
+    ("sensor", "mean_samples"): BenchKey("sensor_mean_samples", "", 1.0, 1e4),
+    ("sensor", "lag_s"): BenchKey("sensor_lag_s", "s", 0.0, 1e3),
+    ("sensor", "clock_ppm"): BenchKey("sensor_clock_ppm", "ppm", -1e5, 1e5),
+    ("start", "displacement_m"): BenchKey("start_displacement_m", "m", -1e3, 1e3),
+    ("start", "velocity_m_per_s"): BenchKey("start_velocity_m_per_s", "m/s", -1e6, 1e6),
+    ("damping", "gamma_per_s"): BenchKey("gamma_per_s", "1/s", 0.0, 1e6),
+    ("damping", "beta_per_m_s"): BenchKey("beta_per_m_s", "1/(m s)", 0.0, 1e6),
+    ("damping", "mu_m_per_s"): BenchKey("mu_m_per_s", "m/s", 0.0, 1e6),
 }
 
-PLACES = {quantity.attribute: place for place, quantity in SCENE_KEYS.items()}
+PLACES = {quantity.attribute: place for place, quantity in BENCH_KEYS.items()}
 """Table and key in a scene file for every quantity, by its attribute."""
 
 
@@ -128,7 +128,7 @@ class Scene:
 
     def __post_init__(self) -> None:
         """Check every value, and take a number or a pair (value, u) for the estimate that it states."""
-        for (table, key), quantity in SCENE_KEYS.items():
+        for (table, key), quantity in BENCH_KEYS.items():
             if (given := getattr(self, quantity.attribute)) is not None:
                 found = _quantity(table, key, given, "scene")
                 if not isinstance(given, Estimate):
@@ -146,9 +146,9 @@ class Scene:
         """
         known: dict[str, Any] = {}
         for table, content in tables.items():
-            allowed = [key for name, key in (*SCENE_KEYS, *_CHOICES) if name == table]
+            allowed = [key for name, key in (*BENCH_KEYS, *_CHOICES) if name == table]
             if not allowed:
-                names = ", ".join(dict.fromkeys(name for name, _ in SCENE_KEYS))
+                names = ", ".join(dict.fromkeys(name for name, _ in BENCH_KEYS))
                 raise SceneError(f"{where}: unknown table [{_short(table)[1:-1]}]", f"allowed are {names}")
             if not isinstance(content, Mapping):
                 raise SceneError(
@@ -164,7 +164,7 @@ class Scene:
                     attribute, texts = _CHOICES[table, key]
                     known[attribute] = _choice(table, key, value, texts(), where)
                 else:
-                    known[SCENE_KEYS[table, key].attribute] = _quantity(table, key, value, where)
+                    known[BENCH_KEYS[table, key].attribute] = _quantity(table, key, value, where)
         scene = cls(**known)
         _check_vapour(scene, where)
         return scene
@@ -172,7 +172,7 @@ class Scene:
     def to_mapping(self) -> dict[str, dict[str, Any]]:
         """Return the tables without unknown quantities; the inverse of :meth:`from_mapping`."""
         tables: dict[str, dict[str, Any]] = {}
-        for (table, key), quantity in SCENE_KEYS.items():
+        for (table, key), quantity in BENCH_KEYS.items():
             estimate: Estimate | None = getattr(self, quantity.attribute)
             if estimate is not None:
                 plain = estimate.u == 0
@@ -212,7 +212,7 @@ def _choice(table: str, key: str, value: object, texts: tuple[str, ...], where: 
 
 
 def _quantity(table: str, key: str, given: Any, where: str) -> Estimate:
-    quantity = SCENE_KEYS[table, key]
+    quantity = BENCH_KEYS[table, key]
     name = f"{where}: [{table}] {key}"
     value, u, unit = given, 0.0, ""
     if isinstance(given, Mapping):

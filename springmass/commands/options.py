@@ -72,11 +72,11 @@ def _setting(text: str) -> tuple[tuple[str, str], Any]:
     match = re.fullmatch(r"\s*(\w+)\.(\w+)\s*=\s*(.+)", text)
     if match is None:
         raise ValueError("must be TABLE.KEY=VALUE as in a scene, for example spring.mass_kg=0.0104+/-0.0001")
-    from pipeline.bench.scene import SCENE_KEYS
+    from pipeline.bench.scene import BENCH_KEYS
     from pipeline.bench.typed import typed
 
     table, key, value = match.groups()
-    quantity = SCENE_KEYS.get((table, key))
+    quantity = BENCH_KEYS.get((table, key))
     return (table, key), value.strip() if quantity is None else typed(value, quantity.unit)
 
 

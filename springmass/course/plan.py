@@ -23,7 +23,7 @@ from acquisition.recordings.identify import dialect_folder
 from acquisition.recordings.reading import READ_FIELDS, ValueKind
 from acquisition.regular_file import open_regular, read_regular
 from pipeline.bench.law_names import ANY_LAW, law_names
-from pipeline.bench.scene import PLACES, SCENE_KEYS, Scene
+from pipeline.bench.scene import BENCH_KEYS, PLACES, Scene
 from pipeline.bench.typed import typed
 from springmass import __version__
 from springmass.comparing.user_table import Row, read_rows
@@ -283,7 +283,7 @@ def _values(folder: Path, row: Row) -> Values:
     for name in PLACES:
         if name in texts:
             try:
-                read = typed(row.plain(name), SCENE_KEYS[PLACES[name]].unit)
+                read = typed(row.plain(name), BENCH_KEYS[PLACES[name]].unit)
             except ValueError as error:
                 raise ProgramError(f"{row.where}: {name} {error}, got {texts[name]!r}", "correct the table") from error
             values[name] = (read.value, row.number(f"{name}_u") if f"{name}_u" in texts else read.u)
