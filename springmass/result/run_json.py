@@ -8,21 +8,17 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from acquisition.recordings.recording import FormatIssue
-from pipeline.analyse import Oscillation
+from pipeline.analysis import Analysis, Oscillation
 from pipeline.findings.finding import UNKNOWN_CODE, Finding, by_severity, kinds, word
 from pipeline.notice import Notice
 from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.results.budget import Contribution
 from springmass import __version__
 from springmass.loading.loaded import Loaded
-from springmass.loading.save import now_utc
 from springmass.result.grades import grades_json
-
-if TYPE_CHECKING:
-    from springmass.runs.run import Run
 
 RESULT_SCHEMA = 3
 EXPANDED = ("dof", "coverage_factor", "expanded")  # of a budget, for its expanded uncertainty
@@ -47,34 +43,17 @@ def rejected(findings: Sequence[Mapping[str, str]]) -> list[str]:
     return list(dict.fromkeys(grave))
 
 
-def result_of(run: Run) -> dict[str, Any]:
-    """Return the result as a JSON-serialisable mapping; numbers that are not finite become None.
-
-    The estimates of the lab report's own method, if the run asks for it, replace those of the analysis.
-    """
-    loaded, analysis, classic, how = run.loaded, run.analysis, run.classic, run.how
-    motion, parameters = analysis.motion, {**how.parameters, "scene": run.scene.to_mapping()}
-    if classic is not None or not isinstance(motion, Oscillation):
-        detailed = NO_DETAILS
-    else:
-        detailed = {
-            "budget": _budgets(motion),
-            "correlations": _correlations(motion),
-            "damping": _damping(motion),
-            "grades": grades_json(analysis),
-        }
-    content = {
-        "schema": RESULT_SCHEMA,
-        "input": input_of(loaded),
-        "recorded": _recorded(loaded),
-        "quality": {**analysis.quality, "malformed_rows": loaded.recording.malformed_rows},
-        "estimates": analysis.estimates if classic is None else classic.estimates,
-        **detailed,
-        "effects": analysis.effects,
-        "findings": analysis.findings,
-        "provenance": provenance_of(how.method or how.accuracy, parameters, run.time_utc or now_utc()),
+def details_of(analysis: Analysis) -> Mapping[str, Any]:
+    """Return budgets, correlations, damping and grades, which are empty for a motion that does not oscillate."""
+    motion = analysis.motion
+    if not isinstance(motion, Oscillation):
+        return NO_DETAILS
+    return {
+        "budget": _budgets(motion),
+        "correlations": _correlations(motion),
+        "damping": _damping(motion),
+        "grades": grades_json(analysis),
     }
-    return {key: plain(value) for key, value in content.items()}
 
 
 def provenance_of(accuracy: str, parameters: Mapping[str, Any], time_utc: str) -> dict[str, Any]:
@@ -97,7 +76,7 @@ def input_of(loaded: Loaded) -> dict[str, Any]:
     }
 
 
-def _recorded(loaded: Loaded) -> dict[str, Any]:
+def recorded_of(loaded: Loaded) -> dict[str, Any]:
     """Return the notes made during a recording and later: marks, remarks, trigger and other events, calibration."""
     provenance = loaded.provenance
     return {

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 FEWEST = 16
 """Number of samples before the first analysis, a sixth of a second at 100 Hz."""
-
-
 COLUMNS = (float, float, np.uint8, np.int64)
 """Types of times, distances, flags and host times, which are -1 if there are none."""
 
@@ -95,6 +93,11 @@ class Rolling:
         self._samples.append(*columns_of(block))
         if self._most is not None and len(self._samples) > 2 * self._most:
             self._samples.keep(slice(-self._most, None))
+
+    @property
+    def host_ns(self) -> I8:
+        """The host times of the samples, ns."""
+        return self._samples[:][3]
 
     def due(self) -> bool:
         """Return whether samples came since the last analysis, and the share allows another one."""

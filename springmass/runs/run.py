@@ -22,10 +22,19 @@ from springmass.loading.arrays import loaded_of, refuse_reading
 from springmass.loading.load import load
 from springmass.loading.loaded import Loaded
 from springmass.loading.options import ANALYSIS_DEFAULTS, AnalysisOptions
-from springmass.loading.save import save_run
+from springmass.loading.save import now_utc, save_run
 from springmass.loading.scenes import scene_from, stated_keys
 from springmass.result.frames import estimates_frame, run_dataset, samples_dataset
-from springmass.result.run_json import result_of, with_traps
+from springmass.result.run_json import (
+    NO_DETAILS,
+    RESULT_SCHEMA,
+    details_of,
+    input_of,
+    plain,
+    provenance_of,
+    recorded_of,
+    with_traps,
+)
 from springmass.result.summary import html_summary, text_summary
 from springmass.result.table1 import TableRow, numbers_of, table_rows
 
@@ -119,7 +128,21 @@ class Run(Mapping[str, Estimate]):
     @cached_property
     def result(self) -> dict[str, Any]:
         """The result as JSON has it: what ``springmass analyse --json`` prints and the report stores."""
-        return result_of(self)
+        loaded, analysis, classic, how = self.loaded, self.analysis, self.classic, self.how
+        parameters = {**how.parameters, "scene": self.scene.to_mapping()}
+        content = {
+            "schema": RESULT_SCHEMA,
+            "input": input_of(loaded),
+            "recorded": recorded_of(loaded),
+            "quality": {**analysis.quality, "malformed_rows": loaded.recording.malformed_rows},
+            # The estimates of the lab report's own method replace those of the analysis.
+            "estimates": analysis.estimates if classic is None else classic.estimates,
+            **(details_of(analysis) if classic is None else NO_DETAILS),
+            "effects": analysis.effects,
+            "findings": analysis.findings,
+            "provenance": provenance_of(how.method or how.accuracy, parameters, self.time_utc or now_utc()),
+        }
+        return {name: plain(value) for name, value in content.items()}
 
     @property
     def ok(self) -> bool:

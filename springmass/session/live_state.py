@@ -6,7 +6,6 @@ import enum
 import math
 import mmap
 import shutil
-from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from acquisition.block import I8, Block, Flag
+from acquisition.block import Block, Flag
 from acquisition.decoders.sensor import Sensor
 from acquisition.live.decoding import SensorChain
 from springmass.runs.rolling import NotYet, Rolling
@@ -126,8 +125,6 @@ class LiveState:
     def _begin(self, channel: int) -> None:
         self._channel = channel
         self._motion = self._rolling(channel)
-        self._stamps: deque[I8] = deque()
-        self._last_ns: int | None = None
 
     def follow(self, channel: int) -> None:
         """Show the motion of a different channel from now on: that of the sensor that came back on the first port."""
@@ -145,9 +142,6 @@ class LiveState:
             self._motion.push(block)
             if channel == 0:
                 self.origin.push(block)
-            if block.host_ns is not None:
-                self._stamps.append(block.host_ns)
-                self._last_ns = int(block.host_ns[-1])
 
     def motion(self) -> Run | NotYet:
         """Return the run of the first sensor's last seconds, or why there is none yet."""
@@ -158,14 +152,12 @@ class LiveState:
 
     def silent_s(self, now_ns: int) -> float:
         """Return the time since the first sensor's last reading, s; 0 before the first reading."""
-        return 0.0 if self._last_ns is None else (now_ns - self._last_ns) * 1e-9
+        host_ns = self._motion.host_ns
+        return (now_ns - int(host_ns[-1])) * 1e-9 if host_ns.size else 0.0
 
     def rate_hz(self, now_ns: int) -> int:
         """Return the number of samples received from the first sensor in the last second."""
-        since = now_ns - SECOND_NS
-        while self._stamps and self._stamps[0][-1] < since:
-            self._stamps.popleft()
-        return sum(int(np.count_nonzero(stamps >= since)) for stamps in self._stamps)
+        return int(np.count_nonzero(self._motion.host_ns >= now_ns - SECOND_NS))
 
 
 def demand_room() -> None:
