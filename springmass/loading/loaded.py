@@ -111,9 +111,6 @@ class Loaded:
         low = -math.inf if options.from_s is None else options.from_s
         high = math.inf if options.to_s is None else options.to_s
         ppm = self.clock_ppm if options.clock_ppm is None else options.clock_ppm
-        if options.clock_ppm is not None and self.track.clock_limit is None:
-            problem = f"{self.source or 'arrays'}: clock_ppm has no effect, because no clocks were compared"
-            raise ProgramError(problem, "leave it out")
         part = replace(self, from_s=max(low, self.from_s), to_s=min(high, self.to_s), clock_ppm=ppm)
         if (options.from_s, options.to_s) != (None, None) and not len(part.track):
             times = self.track.t[np.isfinite(self.track.t)]
