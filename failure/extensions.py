@@ -35,9 +35,10 @@ def load_entry(
 
 
 def load_named(group: str, name: str, kind: type[Any], refused: type[Error]) -> Any:
-    """Load what another package adds to a group under a name, which must be of a kind and have that name."""
+    """Load what another package adds to a group under a name, alone or in a table by name; it must be of a kind."""
 
     def checked(loaded: Any) -> Any:
+        loaded = loaded.get(name) if isinstance(loaded, dict) else loaded
         if not isinstance(loaded, kind) or loaded.name != name:
             raise refused(f"expected {kind.__name__} of the name {name!r}, got {loaded!r:.80}")
         return loaded

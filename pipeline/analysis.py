@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pipeline.bench.scene import Scene
 from pipeline.checks.echoes import count_quality
 from pipeline.errors import AnalysisError
@@ -18,7 +21,7 @@ from pipeline.results.curves import Smoothed, kinematics
 from pipeline.results.derive import Derived
 from pipeline.results.effects import Effect
 from pipeline.samples.condition import Samples
-from pipeline.track import U8, Track
+from pipeline.track import U8, UNUSABLE, Track
 from pipeline.windows.cycles import Cycles
 
 
@@ -66,6 +69,11 @@ class Analysis:
     def flags(self) -> U8:
         """The final flags of all samples, (n,) uint8."""
         return self.motion.windows.flags if isinstance(self.motion, Oscillation) else self.samples.flags
+
+    @property
+    def used(self) -> NDArray[np.bool_]:
+        """(n,) bool: True for samples without any flag that excludes them."""
+        return np.asarray((self.flags & UNUSABLE) == 0, np.bool_)
 
     @property
     def quality(self) -> dict[str, int]:

@@ -101,7 +101,7 @@ _WRITTEN = (
 )  # fmt: skip
 
 
-def exponents_of(unit: str | None) -> tuple[float, ...] | None:
+def _exponents(unit: str | None) -> tuple[float, ...] | None:
     """Return the exponents of a unit such as ``1/(m s)``; None for one that is not made of known ones."""
     if unit is None:
         return None
@@ -117,7 +117,7 @@ def exponents_of(unit: str | None) -> tuple[float, ...] | None:
     return tuple(total)
 
 
-_NAMES = {found: unit for unit in reversed(_WRITTEN) if (found := exponents_of(unit)) is not None}
+_NAMES = {found: unit for unit in reversed(_WRITTEN) if (found := _exponents(unit)) is not None}
 _NAMES[(0.0,) * 5] = ""
 
 
@@ -127,7 +127,7 @@ def product_of(left: str | None, right: str | None, power: int) -> str | None:
     >>> product_of("N/m", "s^2", 1), product_of("m", "s", -1), product_of("N", "s^2", -1)
     ('kg', 'm/s', None)
     """
-    of_left, of_right = exponents_of(left), exponents_of(right)
+    of_left, of_right = _exponents(left), _exponents(right)
     if of_left is None or of_right is None:
         return None
     return _NAMES.get(tuple(a + power * b for a, b in zip(of_left, of_right, strict=True)))
@@ -139,7 +139,7 @@ def power_of(unit: str | None, exponent: float) -> str | None:
     >>> power_of("s", -1), power_of("m^2", 0.5), power_of("kg", 2)
     ('1/s', 'm', None)
     """
-    powers = exponents_of(unit)
+    powers = _exponents(unit)
     return None if powers is None else _NAMES.get(tuple(float(exponent) * each for each in powers))
 
 

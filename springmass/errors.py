@@ -39,7 +39,7 @@ class ProgramError(Error):
     """An error for the user, with an exit code."""
 
     def __init__(
-        self, problem: str, remedy: str = "", /, *, where: str = "", between: str = "; ", exit_code: int = USAGE
+        self, problem: str, remedy: str = "", exit_code: int = USAGE, *, where: str = "", between: str = "; "
     ) -> None:
         super().__init__(problem, remedy, where=where, between=between)
         self.exit_code = exit_code

@@ -1,15 +1,52 @@
-"""How numbers, units and the standing of a law are written, on a page and in a table."""
+"""How numbers, units and the standing of a law are written: on a page, in a table and in LaTeX."""
 
 from __future__ import annotations
 
 import math
 import re
+import unicodedata
+from collections.abc import Callable
+from typing import NamedTuple
 
 from acquisition.errors import visible
 from pipeline.damping.select import Damping
-from pipeline.numerics.estimate import Estimate, UpperLimit, format_limit, format_value
+from pipeline.numerics.estimate import Estimate, UpperLimit, format_limit, format_value, in_brackets
 
-_PAGE_UNITS = {"1": "", "degC": "°C", "m/s^2": "m/s²", "1/s": "s⁻¹", "1/(m s)": "m⁻¹ s⁻¹"}
+
+class _Written(NamedTuple):
+    """How a unit is written: for siunitx, on the page, and with a prefix.
+
+    A prefix is (upper limit of the value, factor, unit with its prefix), the smallest limit first.
+    """
+
+    tex: str
+    page: str | None = None  # as it is, with powers raised
+    prefixes: tuple[tuple[float, float, str], ...] = ()
+
+
+_UNITS = {
+    "1": _Written("", ""),
+    # Periods stay in seconds down to 0.1 s.
+    "s": _Written(r"\second", prefixes=((1e-3, 1e6, "µs"), (0.1, 1e3, "ms"))),
+    "Hz": _Written(r"\hertz"),
+    "rad": _Written(r"\radian"),
+    "rad/s": _Written(r"\radian\per\second"),
+    "N/m": _Written(r"\newton\per\metre"),
+    "m": _Written(r"\metre", prefixes=((1e-3, 1e6, "µm"), (1.0, 1e3, "mm"))),
+    "kg": _Written(r"\kilogram", prefixes=((1e-3, 1e6, "mg"), (1.0, 1e3, "g"))),
+    "m/s": _Written(r"\metre\per\second", prefixes=((1e-4, 1e6, "µm/s"), (0.1, 1e3, "mm/s"))),
+    "1/s": _Written(r"\per\second", "s⁻¹"),
+    "1/(m s)": _Written(r"\per\metre\per\second", "m⁻¹ s⁻¹"),
+    "m^(1-n)/s": _Written(r"\metre^{1-n}\per\second"),
+    "V": _Written(r"\volt"),
+    "N": _Written(r"\newton"),
+    "m/s^2": _Written(r"\metre\per\second\squared"),
+    "rad/s^2": _Written(r"\radian\per\second\squared"),
+    "1/m": _Written(r"\per\metre"),
+    "1/rad": _Written(r"\per\radian"),
+    "degC": _Written(r"\degreeCelsius", "°C"),
+    "Pa": _Written(r"\pascal"),
+}
 _SUPERSCRIPT = str.maketrans("-0123456789n", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ")
 _POWER = re.compile(r"\^(?:\(([\dn-]+)\)|([\dn-]+))")
 NOTHING = "-"
@@ -45,8 +82,8 @@ _FORMULA = ("=", "+", "-", "@", "＝", "＋", "－", "＠")
 """Characters with which a formula begins in a spreadsheet."""
 
 
-def pretty(estimate: Estimate | None) -> str:
-    """Return an estimate for the page: the digits of :func:`pipeline.numerics.estimate.format_value`, typeset.
+def pretty(estimate: Estimate | None, write: Callable[[float, float], str] = format_value) -> str:
+    """Return an estimate for the page: the digits of a function for plain text, typeset.
 
     >>> pretty(Estimate(-8.36e-5, 9.6e-7, "m"))
     '(−8.360 ± 0.096) × 10⁻⁵ m'
@@ -54,9 +91,8 @@ def pretty(estimate: Estimate | None) -> str:
     if estimate is None:
         return "–"
     if isinstance(estimate, UpperLimit):
-        return f"< {_typeset(format_limit(estimate.limit))} {page_unit(estimate.unit)}".rstrip() + " (95 %)"
-    number = format_value(estimate.value, estimate.u)
-    return f"{_typeset(number)} {page_unit(estimate.unit)}".rstrip()
+        return f"< {typeset(format_limit(estimate.limit))} {page_unit(estimate.unit)}".rstrip() + " (95 %)"
+    return f"{typeset(write(estimate.value, estimate.u))} {page_unit(estimate.unit)}".rstrip()
 
 
 def pretty_number(value: float | None, digits: int = 2) -> str:
@@ -67,17 +103,7 @@ def pretty_number(value: float | None, digits: int = 2) -> str:
     """
     if value is None or value != value:
         return "–"
-    return _typeset(f"{value:#.{digits}g}".rstrip("."))
-
-
-# For each unit: (upper limit of the value, factor, unit with its prefix), the smallest limit first. Periods stay in
-# seconds down to 0.1 s.
-_PREFIXES = {
-    "m": ((1e-3, 1e6, "µm"), (1.0, 1e3, "mm")),
-    "kg": ((1e-3, 1e6, "mg"), (1.0, 1e3, "g")),
-    "s": ((1e-3, 1e6, "µs"), (0.1, 1e3, "ms")),
-    "m/s": ((1e-4, 1e6, "µm/s"), (0.1, 1e3, "mm/s")),
-}
+    return typeset(f"{value:#.{digits}g}".rstrip("."))
 
 
 def prefixed(estimate: Estimate) -> Estimate:
@@ -87,7 +113,7 @@ def prefixed(estimate: Estimate) -> Estimate:
     51.450(20) mm
     """
     size = max(abs(estimate.value), estimate.u if math.isfinite(estimate.u) else 0.0)
-    for below, factor, unit in _PREFIXES.get(estimate.unit, ()):
+    for below, factor, unit in _UNITS[estimate.unit].prefixes if estimate.unit in _UNITS else ():
         if 0.0 < size < below:
             value, u = (float(f"{x * factor:.15g}") for x in (estimate.value, estimate.u))
             return type(estimate)(value, u, unit)
@@ -100,8 +126,8 @@ def page_unit(unit: str) -> str:
     >>> page_unit("1/(m s)"), page_unit("rad/s^2"), page_unit("m^(1-n)/s"), page_unit("(m/s^2)^(1-n)/s")
     ('m⁻¹ s⁻¹', 'rad/s²', 'm¹⁻ⁿ/s', '(m/s²)¹⁻ⁿ/s')
     """
-    if unit in _PAGE_UNITS:
-        return _PAGE_UNITS[unit]
+    if unit in _UNITS and (page := _UNITS[unit].page) is not None:
+        return page
     return _POWER.sub(lambda power: (power[1] or power[2]).translate(_SUPERSCRIPT), unit)
 
 
@@ -114,16 +140,6 @@ def law_status(damping: Damping, name: str) -> str:
     if damping.fits[name].rejected:
         return "rejected"
     return "admissible" if name in damping.admissible else "unlikely"
-
-
-def _typeset(number: str) -> str:
-    mantissa, mark, power = number.replace("+-", "±").partition("e")
-    mantissa = mantissa.replace("-", "−")
-    return f"{mantissa} × 10{_superscript(int(power))}" if mark else mantissa
-
-
-def _superscript(power: int) -> str:
-    return str(power).translate(_SUPERSCRIPT)
 
 
 def cells(estimate: Estimate | None) -> str:
@@ -161,7 +177,7 @@ def equation(name: str, estimate: Estimate) -> str:
 
 _SUBSTITUTES = (
     (re.compile(r"(?<=[\d)] )(1/\(m s\)|1/s|m/s\^2|degC)(?!\w)"), lambda found: page_unit(found[1])),
-    (re.compile(r"(?<=[\d)])e([+-]\d+)\b"), lambda found: f" × 10{_superscript(int(found[1]))}"),
+    (re.compile(r"(?<=[\d)])e([+-]\d+)\b"), lambda found: f" × 10{str(int(found[1])).translate(_SUPERSCRIPT)}"),
     (re.compile(r"\+-"), "±"),
     (re.compile(r"(?<![\w.+-])-(?=\d)"), "−"),
     (re.compile(r"\b(gamma|beta|mu)(?= = )"), lambda found: LETTERS[found[1]]),
@@ -180,3 +196,59 @@ def typeset(message: str) -> str:
     for pattern, by in _SUBSTITUTES:
         message = pattern.sub(by, message)
     return message
+
+
+_TEX_SPECIAL = {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    **{character: "\\" + character for character in "&%$#_{}"},
+}
+_TEX_MATH = {
+    **dict(zip("±−×·≤≥≈∞", (r"\pm", "-", r"\times", r"\cdot", r"\leq", r"\geq", r"\approx", r"\infty"), strict=True)),
+    "χ²": r"\chi^2",
+    "φ": r"\varphi",
+    "λ": r"\lambda",  # Unicode spells its name without the b
+    **{letter: "\\" + unicodedata.name(letter).split()[-1].lower() for letter in "αβγδζηθκμνπρστψω"},
+    **{letter: "\\" + unicodedata.name(letter).split()[-1].capitalize() for letter in "ΔΩ"},
+    **{lowered: f"_{digit}" for digit, lowered in enumerate("₀₁₂₃₄₅₆₇₈₉")},
+}
+_SUPERSCRIPTS = {raised: plain for plain, raised in zip("-0123456789n", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ", strict=True)}
+
+
+def tex_words(text: str) -> str:
+    """Convert a sentence of the page to LaTeX, with symbols and powers as mathematics."""
+    text = tex_text(text).replace("\u00a0", "~").replace("\u202f", r"\,").replace("“", "``").replace("”", "''")
+    text = re.sub(
+        f"[{''.join(_SUPERSCRIPTS)}]+", lambda run: f"$^{{{''.join(_SUPERSCRIPTS[each] for each in run[0])}}}$", text
+    )
+    for symbol, tex in _TEX_MATH.items():
+        text = text.replace(symbol, f"${tex}$")
+    return text.replace("°C", r"\textcelsius{}").replace("µ", r"\textmu{}").replace("–", "--")
+
+
+def tex_quantity(estimate: Estimate | None) -> str:
+    """Write value(u)unit for siunitx, with two digits of u."""
+    if estimate is None:
+        return "--"
+    if isinstance(estimate, UpperLimit):
+        return f"$<$ {_tex_number(format_limit(estimate.limit), estimate.unit)} (\\qty{{95}}{{\\percent}})"
+    match = re.fullmatch(r"(-?[\d.]+)(\([\d.]+\))?(?:e([+-]\d+))?", in_brackets(estimate.value, estimate.u))
+    if match is None:
+        return "--"
+    # siunitx wants the u in the last digit: 13.9(12) for 13.9(1.2).
+    power = f"e{int(match[3])}" if match[3] else ""
+    return _tex_number(f"{match[1]}{(match[2] or '').replace('.', '')}{power}", estimate.unit)
+
+
+def _tex_number(number: str, unit: str) -> str:
+    """Write a number, possibly with its uncertainty, and its unit for siunitx."""
+    if not unit:
+        return rf"\num{{{number}}}"
+    macro = _UNITS[unit].tex if unit in _UNITS else rf"\text{{{tex_text(unit)}}}"
+    return rf"\qty{{{number}}}{{{macro}}}"
+
+
+def tex_text(text: str) -> str:
+    """Return a text of foreign origin for LaTeX."""
+    return "".join(_TEX_SPECIAL.get(character, character) for character in visible(text))

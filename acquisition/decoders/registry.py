@@ -6,17 +6,15 @@ entry point in the group ``springmass.sensors`` that refers to a :class:`acquisi
 
 from __future__ import annotations
 
-from functools import partial
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 from acquisition.decoders.sensor import Sensor
 from acquisition.errors import SensorError
-from failure.extensions import entry_points_of, load_entry
+from failure.extensions import entry_points_of, load_named
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from importlib.metadata import EntryPoint
 
 SENSORS_GROUP = "springmass.sensors"
 
@@ -37,8 +35,10 @@ _ENOUGH = 0.5
 
 def families() -> tuple[Sensor, ...]:
     """Return all families, with those of this package first."""
-    added = [_load(entry) for name, entry in entry_points_of(SENSORS_GROUP).items() if name not in _MODULES]
-    return (*map(_built_in, _MODULES), *added)
+    return (
+        *map(_built_in, _MODULES),
+        *(_added(name) for name in entry_points_of(SENSORS_GROUP) if name not in _MODULES),
+    )
 
 
 def get_family(name: str) -> Sensor:
@@ -47,7 +47,7 @@ def get_family(name: str) -> Sensor:
         return _built_in(name)
     entries = entry_points_of(SENSORS_GROUP)
     if name in entries:
-        return _load(entries[name])
+        return _added(name)
     names = ", ".join(dict.fromkeys([*_MODULES, *entries]))
     raise SensorError(f"sensor must be one of {names}, got {name!r}")
 
@@ -99,13 +99,6 @@ def _built_in(name: str) -> Sensor:
     return family
 
 
-def _load(entry: EntryPoint) -> Sensor:
-    return cast(Sensor, load_entry(entry, f"sensor {entry.name!r}", SensorError, partial(_checked, entry.name)))
-
-
-def _checked(name: str, loaded: Any) -> Sensor:
-    """Return the loaded family, or the family of the given name if a table of families was loaded."""
-    family = loaded.get(name) if isinstance(loaded, dict) else loaded
-    if not isinstance(family, Sensor):
-        raise SensorError(f"sensor {name!r}: expected a Sensor, got {type(family).__name__}", "repair the package")
+def _added(name: str) -> Sensor:
+    family: Sensor = load_named(SENSORS_GROUP, name, Sensor, SensorError)
     return family

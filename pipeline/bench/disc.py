@@ -29,6 +29,14 @@ def added_mass_kg(scene: Scene) -> float:
     return ADDED_MASS_SHAPE * scene_air_density(scene) * (0.5 * scene.disc_diameter_m.value) ** 3
 
 
+def effective_mass_kg(scene: Scene) -> float:
+    """Return the oscillating mass in kg: the bob, the spring's share, and the air that the disc carries along."""
+    if scene.bob_mass_kg is None:
+        raise SceneError("scene: a mass that oscillates needs [bob] mass_kg", "add it to the scene")
+    spring_kg = 0.0 if scene.spring_mass_kg is None else scene.spring_mass_kg.value
+    return oscillating_mass_kg(spring_kg, scene.bob_mass_kg.value + added_mass_kg(scene))
+
+
 def scene_air(scene: Scene) -> tuple[Estimate, Estimate, Estimate]:
     """Return temperature, degC, pressure, Pa, and relative humidity of a scene's air, or typical values."""
     return (
@@ -83,13 +91,11 @@ def disc_rate(scene: Scene, amplitude_m: float, angular_frequency: float) -> tup
     """
     if scene.bob_mass_kg is None or scene.disc_diameter_m is None:
         raise SceneError("scene: drag is derived for a [bob] mass_kg with a [disc] diameter_m", "add both")
-    spring = 0.0 if scene.spring_mass_kg is None else scene.spring_mass_kg.value
-    mass = oscillating_mass_kg(spring, scene.bob_mass_kg.value + added_mass_kg(scene))
     area, kc = (
         0.25 * math.pi * scene.disc_diameter_m.value**2,
         2.0 * math.pi * amplitude_m / scene.disc_diameter_m.value,
     )
-    drag_per_m = 0.5 * scene_air_density(scene) * disc_drag_coefficient(kc) * area / mass
+    drag_per_m = 0.5 * scene_air_density(scene) * disc_drag_coefficient(kc) * area / effective_mass_kg(scene)
     return 4.0 * drag_per_m * angular_frequency * amplitude_m / (3.0 * math.pi), kc
 
 
@@ -101,9 +107,7 @@ def derive_drag(scene: Scene, amplitude_m: float, seconds: float) -> DerivedDrag
     """
     if scene.bob_mass_kg is None or scene.spring_constant_n_per_m is None or scene.disc_diameter_m is None:
         raise SceneError("scene: drag is derived for a [bob] mass_kg on a [spring] constant_n_per_m", "add both")
-    spring = 0.0 if scene.spring_mass_kg is None else scene.spring_mass_kg.value
-    mass = oscillating_mass_kg(spring, scene.bob_mass_kg.value + added_mass_kg(scene))
-    omega = math.sqrt(scene.spring_constant_n_per_m.value / mass)
+    omega = math.sqrt(scene.spring_constant_n_per_m.value / effective_mass_kg(scene))
 
     def rate(amplitude: float) -> float:
         return disc_rate(scene, amplitude, omega)[0]

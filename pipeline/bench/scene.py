@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import Any, Generic, TypeVar
 
 from pipeline.bench.air import saturation_pressure
 from pipeline.bench.law_names import law_names
@@ -13,27 +13,39 @@ from pipeline.bench.typed import typed
 from pipeline.errors import SceneError
 from pipeline.numerics.estimate import Estimate
 
-Stated: TypeAlias = Estimate | float | str | tuple[float, float] | None
-"""What a scene takes for a quantity: a number, a pair (value, u), or a text with its unit, besides an estimate."""
+TakenT = TypeVar("TakenT")
+KeptT = TypeVar("KeptT")
 POSITIONS = ("below", "above")
-_CHOICES: dict[tuple[str, str], tuple[str, Callable[[], tuple[str, ...]]]] = {
-    ("sensor", "position"): ("sensor_position", lambda: POSITIONS),
-    ("damping", "law"): ("damping_law", law_names),
-}
-"""Keys of a scene file with text values: the attribute for each key, and what returns the allowed texts."""
 
 
-class BenchKey(NamedTuple):
-    """One key of a scene file: its attribute, its unit, and its allowed range, including both ends.
+class _Field(Generic[TakenT, KeptT]):
+    """A field of a scene, which takes what can be made of it and keeps what was made; None if it is unknown."""
+
+    place: tuple[str, str]  # table and key in a scene file
+
+    def __set_name__(self, owner: type[Scene], name: str) -> None:
+        self.attribute = name
+
+    def __get__(self, scene: Scene | None, owner: type[Scene]) -> KeptT | None:
+        return None if scene is None else scene.__dict__[self.attribute]  # that of the class is the default
+
+    def __set__(self, scene: Scene, given: TakenT | None) -> None:
+        scene.__dict__[self.attribute] = None if given is None else self.checked(given, "scene")
+
+    def checked(self, given: Any, where: str) -> KeptT:
+        """Return what is made of a value, also one of a scene file; an error names where it comes from."""
+        raise NotImplementedError
+
+
+class Stated(_Field[Estimate | float | str | tuple[float, float], Estimate]):
+    """A quantity of a scene: its table and key in a scene file, its unit, and its allowed range, including both ends.
 
     The ends lie far beyond any bench. The calculations are known to be valid between them, so every allowed value gives
     a number or a finding. A value with a wrong exponent is rejected when it is read.
     """
 
-    attribute: str
-    unit: str
-    least: float
-    greatest: float
+    def __init__(self, table: str, key: str, unit: str, least: float, greatest: float) -> None:
+        self.place, self.unit, self.least, self.greatest = (table, key), unit, least, greatest
 
     def allowed(self) -> str:
         """Return the range in words."""
@@ -42,33 +54,52 @@ class BenchKey(NamedTuple):
             return f"more than 0{unit}, from {self.least:g} to {self.greatest:g}"
         return f"at least {self.least:g}{unit} and at most {self.greatest:g}"
 
+    def checked(self, given: Any, where: str) -> Estimate:
+        """Return an estimate of a number, a text with its unit, a pair (value, u), a table of the two or an estimate."""
+        table, key = self.place
+        name = f"{where}: [{table}] {key}"
+        value, u, unit = given, 0.0, ""
+        if isinstance(given, Mapping):
+            if "value" not in given or set(given) - {"value", "u"}:
+                raise SceneError(f"{name} must be a number or {{ value = ..., u = ... }}, got {_short(dict(given))}")
+            value, u = given["value"], given.get("u", 0.0)
+        elif isinstance(given, str):
+            try:
+                given = typed(given, self.unit)
+            except ValueError as error:
+                raise SceneError(f"{name} {error}, got {_short(given)}") from error
+            value, u = given.value, given.u
+        elif isinstance(given, tuple) and len(given) == 2:  # as in Scene(bob_mass_kg=(0.2, 0.0001))
+            value, u = given
+        elif hasattr(given, "nominal_value"):  # an estimate, or a number of the uncertainties package
+            value, u, unit = given.nominal_value, given.std_dev, getattr(given, "unit", "")
+        if unit and unit != self.unit:
+            raise SceneError(f"{name} must be in {self.unit or 'no unit'}, got {unit}")
+        number, spread = _number(value, name), _number(u, f"{name}, its u")
+        if not self.least <= number <= self.greatest:
+            raise SceneError(f"{name} must be {self.allowed()}, got {number:g}")
+        if spread < 0:
+            raise SceneError(f"{name}: its u must not be negative, got {spread:g}")
+        if spread > self.greatest:
+            raise SceneError(f"{name}: its u must be at most {self.greatest:g} {self.unit}, got {spread:g}".rstrip())
+        return given if isinstance(given, Estimate) else Estimate(number, spread, self.unit)
 
-BENCH_KEYS: dict[tuple[str, str], BenchKey] = {
-    ("bob", "mass_kg"): BenchKey("bob_mass_kg", "kg", 1e-12, 1e6),
-    ("spring", "mass_kg"): BenchKey("spring_mass_kg", "kg", 0.0, 1e6),
-    ("spring", "constant_n_per_m"): BenchKey("spring_constant_n_per_m", "N/m", 1e-12, 1e12),
-    ("spring", "cubic_n_per_m3"): BenchKey("spring_cubic_n_per_m3", "N/m3", -1e18, 1e18),
-    ("pendulum", "length_m"): BenchKey("pendulum_length_m", "m", 1e-4, 1e4),
-    ("disc", "diameter_m"): BenchKey("disc_diameter_m", "m", 1e-6, 1e3),
-    ("air", "temperature_c"): BenchKey("air_temperature_c", "degC", -100.0, 200.0),
-    ("air", "pressure_pa"): BenchKey("air_pressure_pa", "Pa", 1e-3, 1e7),
-    ("air", "relative_humidity"): BenchKey("air_relative_humidity", "", 0.0, 1.0),
-    ("sensor", "sigma_m"): BenchKey("sensor_sigma_m", "m", 1e-12, 1e3),
-    ("sensor", "mean_samples"): BenchKey("sensor_mean_samples", "", 1.0, 1e4),
-    ("sensor", "lag_s"): BenchKey("sensor_lag_s", "s", 0.0, 1e3),
-    ("sensor", "clock_ppm"): BenchKey("sensor_clock_ppm", "ppm", -1e5, 1e5),
-    ("start", "displacement_m"): BenchKey("start_displacement_m", "m", -1e3, 1e3),
-    ("start", "velocity_m_per_s"): BenchKey("start_velocity_m_per_s", "m/s", -1e6, 1e6),
-    ("damping", "gamma_per_s"): BenchKey("gamma_per_s", "1/s", 0.0, 1e6),
-    ("damping", "beta_per_m_s"): BenchKey("beta_per_m_s", "1/(m s)", 0.0, 1e6),
-    ("damping", "mu_m_per_s"): BenchKey("mu_m_per_s", "m/s", 0.0, 1e6),
-}
 
-PLACES = {quantity.attribute: place for place, quantity in BENCH_KEYS.items()}
-"""Table and key in a scene file for every quantity, by its attribute."""
+class Choice(_Field[str, str]):
+    """A text of a scene: its table and key in a scene file, and what returns the allowed texts."""
+
+    def __init__(self, table: str, key: str, texts: Callable[[], tuple[str, ...]]) -> None:
+        self.place, self.texts = (table, key), texts
+
+    def checked(self, given: Any, where: str) -> str:
+        """Return a text if it is one of those allowed."""
+        if given not in (texts := self.texts()):
+            table, key = self.place
+            raise SceneError(f"{where}: [{table}] {key} must be one of {', '.join(texts)}, got {_short(given)}")
+        return str(given)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Scene:
     """The quantities of the bench.
 
@@ -78,64 +109,26 @@ class Scene:
     known; an analysis states its results by this law.
     """
 
-    bob_mass_kg: Estimate | None = None
-    spring_mass_kg: Estimate | None = None
-    spring_constant_n_per_m: Estimate | None = None
-    spring_cubic_n_per_m3: Estimate | None = None
-    pendulum_length_m: Estimate | None = None
-    disc_diameter_m: Estimate | None = None
-    air_temperature_c: Estimate | None = None
-    air_pressure_pa: Estimate | None = None
-    air_relative_humidity: Estimate | None = None
-    sensor_sigma_m: Estimate | None = None
-    sensor_position: str | None = None
-    sensor_mean_samples: Estimate | None = None
-    sensor_lag_s: Estimate | None = None
-    sensor_clock_ppm: Estimate | None = None
-    start_displacement_m: Estimate | None = None
-    start_velocity_m_per_s: Estimate | None = None
-    gamma_per_s: Estimate | None = None
-    beta_per_m_s: Estimate | None = None
-    mu_m_per_s: Estimate | None = None
-    damping_law: str | None = None
-
-    if TYPE_CHECKING:  # a number or a pair becomes an estimate, which a checker cannot know
-
-        def __init__(
-            self,
-            *,
-            bob_mass_kg: Stated = None,
-            spring_mass_kg: Stated = None,
-            spring_constant_n_per_m: Stated = None,
-            spring_cubic_n_per_m3: Stated = None,
-            pendulum_length_m: Stated = None,
-            disc_diameter_m: Stated = None,
-            air_temperature_c: Stated = None,
-            air_pressure_pa: Stated = None,
-            air_relative_humidity: Stated = None,
-            sensor_sigma_m: Stated = None,
-            sensor_position: str | None = None,
-            sensor_mean_samples: Stated = None,
-            sensor_lag_s: Stated = None,
-            sensor_clock_ppm: Stated = None,
-            start_displacement_m: Stated = None,
-            start_velocity_m_per_s: Stated = None,
-            gamma_per_s: Stated = None,
-            beta_per_m_s: Stated = None,
-            mu_m_per_s: Stated = None,
-            damping_law: str | None = None,
-        ) -> None: ...
-
-    def __post_init__(self) -> None:
-        """Check every value, and take a number or a pair (value, u) for the estimate that it states."""
-        for (table, key), quantity in BENCH_KEYS.items():
-            if (given := getattr(self, quantity.attribute)) is not None:
-                found = _quantity(table, key, given, "scene")
-                if not isinstance(given, Estimate):
-                    object.__setattr__(self, quantity.attribute, found)
-        for (table, key), (attribute, texts) in _CHOICES.items():
-            if (text := getattr(self, attribute)) is not None:
-                _choice(table, key, text, texts(), "scene")
+    bob_mass_kg: Stated = Stated("bob", "mass_kg", "kg", 1e-12, 1e6)
+    spring_mass_kg: Stated = Stated("spring", "mass_kg", "kg", 0.0, 1e6)
+    spring_constant_n_per_m: Stated = Stated("spring", "constant_n_per_m", "N/m", 1e-12, 1e12)
+    spring_cubic_n_per_m3: Stated = Stated("spring", "cubic_n_per_m3", "N/m3", -1e18, 1e18)
+    pendulum_length_m: Stated = Stated("pendulum", "length_m", "m", 1e-4, 1e4)
+    disc_diameter_m: Stated = Stated("disc", "diameter_m", "m", 1e-6, 1e3)
+    air_temperature_c: Stated = Stated("air", "temperature_c", "degC", -100.0, 200.0)
+    air_pressure_pa: Stated = Stated("air", "pressure_pa", "Pa", 1e-3, 1e7)
+    air_relative_humidity: Stated = Stated("air", "relative_humidity", "", 0.0, 1.0)
+    sensor_sigma_m: Stated = Stated("sensor", "sigma_m", "m", 1e-12, 1e3)
+    sensor_position: Choice = Choice("sensor", "position", lambda: POSITIONS)
+    sensor_mean_samples: Stated = Stated("sensor", "mean_samples", "", 1.0, 1e4)
+    sensor_lag_s: Stated = Stated("sensor", "lag_s", "s", 0.0, 1e3)
+    sensor_clock_ppm: Stated = Stated("sensor", "clock_ppm", "ppm", -1e5, 1e5)
+    start_displacement_m: Stated = Stated("start", "displacement_m", "m", -1e3, 1e3)
+    start_velocity_m_per_s: Stated = Stated("start", "velocity_m_per_s", "m/s", -1e6, 1e6)
+    gamma_per_s: Stated = Stated("damping", "gamma_per_s", "1/s", 0.0, 1e6)
+    beta_per_m_s: Stated = Stated("damping", "beta_per_m_s", "1/(m s)", 0.0, 1e6)
+    mu_m_per_s: Stated = Stated("damping", "mu_m_per_s", "m/s", 0.0, 1e6)
+    damping_law: Choice = Choice("damping", "law", law_names)
 
     @classmethod
     def from_mapping(cls, tables: Mapping[str, Any], *, where: str = "scene") -> Scene:
@@ -160,11 +153,8 @@ class Scene:
                         f"{where}: unknown key {_short(key)} in [{table}] (value {_short(value)})",
                         f"allowed are {', '.join(allowed)}",
                     )
-                if (table, key) in _CHOICES:
-                    attribute, texts = _CHOICES[table, key]
-                    known[attribute] = _choice(table, key, value, texts(), where)
-                else:
-                    known[BENCH_KEYS[table, key].attribute] = _quantity(table, key, value, where)
+                field: _Field[Any, Any] = BENCH_KEYS.get((table, key)) or _CHOICES[table, key]
+                known[field.attribute] = field.checked(value, where)
         scene = cls(**known)
         _check_vapour(scene, where)
         return scene
@@ -179,8 +169,8 @@ class Scene:
                 tables.setdefault(table, {})[key] = (
                     estimate.value if plain else {"value": estimate.value, "u": estimate.u}
                 )
-        for (table, key), (attribute, _) in _CHOICES.items():
-            if (text := getattr(self, attribute)) is not None:
+        for (table, key), choice in _CHOICES.items():
+            if (text := getattr(self, choice.attribute)) is not None:
                 tables.setdefault(table, {})[key] = text
         return tables
 
@@ -189,6 +179,12 @@ class Scene:
         """Whether the scene describes a rangefinder under [sensor], and not only a noise, which all distances have."""
         given = (self.sensor_position, self.sensor_mean_samples, self.sensor_lag_s)
         return any(x is not None for x in given)
+
+
+BENCH_KEYS = {each.place: each for each in vars(Scene).values() if isinstance(each, Stated)}
+_CHOICES = {each.place: each for each in vars(Scene).values() if isinstance(each, Choice)}
+PLACES = {quantity.attribute: place for place, quantity in BENCH_KEYS.items()}
+"""Table and key in a scene file for every quantity, by its attribute."""
 
 
 def _check_vapour(scene: Scene, where: str) -> None:
@@ -203,46 +199,6 @@ def _check_vapour(scene: Scene, where: str) -> None:
             f"a vapour pressure of at most pressure_pa {pascal.value:g}, got {vapour_pa:.3g} Pa",
             "one of the three is wrong",
         )
-
-
-def _choice(table: str, key: str, value: object, texts: tuple[str, ...], where: str) -> str:
-    if value not in texts:
-        raise SceneError(f"{where}: [{table}] {key} must be one of {', '.join(texts)}, got {_short(value)}")
-    return str(value)
-
-
-def _quantity(table: str, key: str, given: Any, where: str) -> Estimate:
-    quantity = BENCH_KEYS[table, key]
-    name = f"{where}: [{table}] {key}"
-    value, u, unit = given, 0.0, ""
-    if isinstance(given, Mapping):
-        if "value" not in given or set(given) - {"value", "u"}:
-            raise SceneError(f"{name} must be a number or {{ value = ..., u = ... }}, got {_short(dict(given))}")
-        value, u = given["value"], given.get("u", 0.0)
-    elif isinstance(given, str):
-        try:
-            read = typed(given, quantity.unit)
-        except ValueError as error:
-            raise SceneError(f"{name} {error}, got {_short(given)}") from error
-        value, u = read.value, read.u
-    elif isinstance(given, tuple) and len(given) == 2:  # as in Scene(bob_mass_kg=(0.2, 0.0001))
-        value, u = given
-    elif isinstance(given, Estimate):
-        value, u, unit = given.value, given.u, given.unit
-    elif hasattr(given, "nominal_value"):  # a UFloat, or a quantity with a unit
-        value, u, unit = given.nominal_value, given.std_dev, getattr(given, "unit", "")
-    if unit and unit != quantity.unit:
-        raise SceneError(f"{name} must be in {quantity.unit or 'no unit'}, got {unit}")
-    number, spread = _number(value, name), _number(u, f"{name}, its u")
-    if not quantity.least <= number <= quantity.greatest:
-        raise SceneError(f"{name} must be {quantity.allowed()}, got {number:g}")
-    if spread < 0:
-        raise SceneError(f"{name}: its u must not be negative, got {spread:g}")
-    if spread > quantity.greatest:
-        raise SceneError(
-            f"{name}: its u must be at most {quantity.greatest:g} {quantity.unit}, got {spread:g}".rstrip()
-        )
-    return Estimate(number, spread, quantity.unit)
 
 
 def _number(value: object, name: str) -> float:

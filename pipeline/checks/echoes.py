@@ -44,7 +44,7 @@ def echoes_by_chance(before: U8, windows: Windows) -> bool:
     if np.any(before & echo):
         return False
     rows = np.flatnonzero(windows.flags & echo)
-    n = int(np.count_nonzero((windows.flags & UNUSABLE) == 0)) + rows.size
+    n = int(np.count_nonzero(windows.used)) + rows.size
     farthest = float(np.max(np.abs(windows.residual[rows]), initial=0.0))
     expected = 2.0 * n * 2.0 * float(ndtr(-CLIP_SIGMAS))
     return bool(
@@ -71,7 +71,7 @@ def find_clusters(track: Track, windows: Windows, phase: Phase) -> dict[str, flo
         return {}
     angle = phase.total(track.t[rows])
     middles = angle[(starts + sizes // 2)[clusters]]
-    fitted = int(np.count_nonzero((windows.flags & UNUSABLE) == 0)) + rows.size
+    fitted = int(np.count_nonzero(windows.used)) + rows.size
     residual = windows.residual[rows]
     residual[~np.isfinite(residual)] = 0.0
     return {

@@ -14,7 +14,6 @@ from pipeline.motion.fitted import Fitted
 from pipeline.numerics.levels import NEGLIGIBLE
 from pipeline.numerics.robust import median
 from pipeline.samples.condition import Samples
-from pipeline.track import UNUSABLE
 
 
 class Limit(NamedTuple):
@@ -72,7 +71,7 @@ def beyond_limits(samples: Samples, fitted: Fitted) -> Iterator[Outcome]:
 def _numbers(samples: Samples, fitted: Fitted) -> dict[str, float]:
     """Return the numbers by name, NaN where they have no meaning for the record's quantity."""
     track, windows = samples.track, fitted.windows
-    used = (windows.flags & UNUSABLE) == 0
+    used = windows.used
     t, y = track.t[used], track.y[used]
     omega, amplitude = fitted.phase.angular_frequency.value, float(np.max(np.abs(windows.amplitude)))
     f, rest = omega / (2.0 * math.pi), abs(float(np.mean(windows.offset)))

@@ -13,7 +13,7 @@ from pipeline.motion.fitted import Fitted
 from pipeline.numerics.levels import FEWEST_FOR_LINE
 from pipeline.numerics.robust import median
 from pipeline.samples.condition import Samples
-from pipeline.track import F8, UNUSABLE
+from pipeline.track import F8
 from pipeline.windows.demodulate import model_error
 
 # Parts of the run that must agree on a shape. At a probability of 1e-6 its power must be 23 times its variance, instead
@@ -95,7 +95,7 @@ class Residual:
 def residual_of(samples: Samples, fitted: Fitted, filter_: SensorFilter | None) -> Residual:
     """Return the residual of a run that was fitted by its windows."""
     windows, modes, t = fitted.windows, fitted.modes, samples.track.t
-    rows = np.flatnonzero(((windows.flags & UNUSABLE) == 0) & np.isfinite(windows.residual))
+    rows = np.flatnonzero(windows.used & np.isfinite(windows.residual))
     values = windows.residual[rows]
     locked = tuple(mode for mode in modes.members if mode.kind == "harmonic")
     if modes.subtracted is not None and locked:

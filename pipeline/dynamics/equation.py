@@ -11,9 +11,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from pipeline.bench.disc import added_mass_kg
+from pipeline.bench.disc import effective_mass_kg
 from pipeline.bench.scene import Scene
-from pipeline.bench.spring import oscillating_mass_kg
 from pipeline.errors import DynamicsError, SceneError
 from pipeline.numerics.estimate import Estimate
 
@@ -194,13 +193,6 @@ class Problem:
             return cls(equation, _value(scene.start_displacement_m), _value(scene.start_velocity_m_per_s))
         except DynamicsError as error:
             raise DynamicsError(error.problem, error.remedy, where=f"{where}: ") from error
-
-
-def effective_mass_kg(scene: Scene) -> float:
-    """Return the oscillating mass in kg: the bob, the spring's share, and the air that the disc carries along."""
-    if scene.bob_mass_kg is None:
-        raise SceneError("scene: a mass that oscillates needs [bob] mass_kg", "add it to the scene")
-    return oscillating_mass_kg(_value(scene.spring_mass_kg), scene.bob_mass_kg.value + added_mass_kg(scene))
 
 
 def _value(estimate: Estimate | None) -> float:

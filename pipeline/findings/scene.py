@@ -35,7 +35,7 @@ def scene_findings(scene: Scene, effects: tuple[Effect, ...], estimates: Mapping
     exact = [name for name, estimate in used.items() if estimate is not None and estimate.u == 0]
     perhaps = [*slips(scene), *_drag(scene, estimates)]
     if perhaps:
-        said = [each.clause if each.clause.endswith("?") else f"{each.clause}." for each in perhaps]
+        said = [each.clause if each.asks else f"{each.clause}." for each in perhaps]
         numbers = {"first": said[0], "more": len(said) - 1 or None, "all": " ".join(said)}
         yield Notice("scene_implausible", numbers, None if any(each.decides for each in perhaps) else "info")
     if "spring_constant" in estimates and scene.bob_mass_kg is not None and scene.spring_mass_kg is None:
@@ -50,4 +50,4 @@ def _drag(scene: Scene, estimates: Mapping[str, Estimate]) -> Iterator[Slip]:
     low, high = USUAL_DRAG
     if drag is not None and not named and not low - 2.0 * drag.u <= drag.value <= high + 2.0 * drag.u:
         clause = f"the drag coefficient would be {drag.value:.2g}, which no disc has: is [disc] diameter_m right?"
-        yield Slip(clause, decides=False)
+        yield Slip(clause, asks=True, decides=False)

@@ -23,7 +23,7 @@ from pipeline.numerics.levels import ROUNDS, SIGNIFICANT
 from pipeline.numerics.regression import beyond
 from pipeline.numerics.robust import mad_sigma
 from pipeline.samples.condition import Samples
-from pipeline.track import C16, F8, UNUSABLE
+from pipeline.track import C16, F8
 from pipeline.windows.demodulate import Windows
 
 # Multiples of the main frequency that bent scales and springs cause; they share the probability CHANCE.
@@ -47,7 +47,7 @@ def find_modes(samples: Samples, windows: Windows) -> Modes:
     A mode within a few reciprocals of the record's length of the main frequency is not searched for. It beats too
     slowly to be distinguished from a change of the amplitude.
     """
-    used = (windows.flags & UNUSABLE) == 0
+    used = windows.used
     t = samples.track.t[used]
     if windows.t.size < LEAST_WINDOWS:
         return Modes(samples)

@@ -18,7 +18,7 @@ from pipeline.damping.law_fit import LawFit
 from pipeline.damping.laws import Law
 from pipeline.damping.select import Damping
 from pipeline.modes.mode import Modes
-from pipeline.motion.fitted import Fitted, Phase, Rest, TimeTable, Waveform, delay, wrapped
+from pipeline.motion.fitted import Fitted, Method, Phase, Rest, TimeTable, Waveform, delay, wrapped
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_LINE, VERY_STRONG
 from pipeline.numerics.regression import (
@@ -30,7 +30,7 @@ from pipeline.numerics.regression import (
     smooth_curve,
     solve_weighted,
 )
-from pipeline.track import F8, UNUSABLE
+from pipeline.track import F8
 from pipeline.units import Unit
 from pipeline.windows.cycles import NoOscillation
 from pipeline.windows.demodulate import ROUNDING, Windows
@@ -92,17 +92,17 @@ class Averaged:
 def fit_windows(windows: Windows, modes: Modes, damping: Damping) -> Fitted:
     """Fit phase and rest position to the windows, whose amplitudes gave the laws."""
     samples = modes.samples
-    track, flags = samples.track, windows.flags
-    last = float(np.max(track.t, where=(flags & UNUSABLE) == 0, initial=-np.inf))
+    track = samples.track
+    last = float(np.max(track.t, where=windows.used, initial=-np.inf))
     phase = fit_phase(windows, damping, last)
     rest = fit_rest(windows, track.unit)
     return assembled(windows, modes, damping, phase, rest, "windows")
 
 
-def assembled(windows: Windows, modes: Modes, damping: Damping, phase: Phase, rest: Rest, method: str) -> Fitted:
+def assembled(windows: Windows, modes: Modes, damping: Damping, phase: Phase, rest: Rest, method: Method) -> Fitted:
     """Return the fitted oscillation with its waveform: rest position, amplitude and phase at every sample."""
     track = modes.samples.track
-    used = (windows.flags & UNUSABLE) == 0
+    used = windows.used
     # A law is valid only where it was fitted: before the first and after the last sample used it is held constant.
     last = float(np.max(track.t, where=used, initial=-np.inf))
     best = damping.best

@@ -126,7 +126,7 @@ def _rows(fitted: Fitted, samples: Samples, level: float) -> Rows:
     free, flags = fitted.modes.samples, fitted.windows.flags
     track = free.track
     known = np.isfinite(track.y) & np.isfinite(track.t)
-    usable = (free.flags & UNUSABLE) == 0
+    usable = free.used
     echo = (flags & np.uint8(Quality.FALSE_ECHO)) != 0
     # Samples excluded by a window's narrow spread or a neighbouring spike may return; those in clusters may not.
     run = np.convolve(echo, np.ones(3), "same") == 3
@@ -140,7 +140,7 @@ def _rows(fitted: Fitted, samples: Samples, level: float) -> Rows:
     def near_plateau(position: F8) -> Bools:
         return free.near_plateau(level + position, fitted.windows.noise)
 
-    used = usable & ((flags & UNUSABLE) == 0)
+    used = usable & fitted.windows.used
     return Rows(t=t, y=y, candidates=candidates, used=used, u=1.0, columns=columns, near_plateau=near_plateau)
 
 

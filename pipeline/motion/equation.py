@@ -32,7 +32,7 @@ from pipeline.numerics.levels import MISFIT, NOTICEABLE
 from pipeline.numerics.regression import correlation_length
 from pipeline.parts.stopping import stop_row
 from pipeline.samples.condition import Samples
-from pipeline.track import F8, UNUSABLE
+from pipeline.track import F8
 from pipeline.units import amount
 from pipeline.windows.demodulate import Windows
 
@@ -280,10 +280,9 @@ def _rows(samples: Samples, windows: Windows, damping: Damping) -> Rows:
     within = used & (np.arange(track.t.size) < (track.t.size if stop is None else stop))
     last, first = float(np.max(track.t[used])), damping.t0
     t = np.clip(np.where(np.isfinite(track.t), track.t, first), first, last) - first
-    quantum = (samples.quantum or 0.0) / math.sqrt(12.0)
-    expected = max(samples.noise, quantum, 1e-9 * abs(float(damping.best.joint.values[0])))
+    expected = max(samples.noise_of_reading, 1e-9 * abs(float(damping.best.joint.values[0])))
     # False echoes of the windows that the solution explains return later.
-    used_first = within & ((windows.flags & UNUSABLE) == 0)
+    used_first = within & windows.used
     return Rows(
         t=t,
         y=track.y,

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -81,6 +82,10 @@ class Waveform:
         return self.moving()
 
 
+Method = Literal["windows", "samples", "equation"]
+"""What the motion was fitted to."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Fitted:
     """An oscillation in the form that the stages after the fit use."""
@@ -91,7 +96,7 @@ class Fitted:
     phase: Phase
     rest: Rest
     waveform: Waveform  # including the modes
-    method: str  # "windows", "samples" or "equation"
+    method: Method
     why: str  # what a method that failed, or the equation of motion, came to
 
     def first_shift(self, kappa: float) -> tuple[float, float]:

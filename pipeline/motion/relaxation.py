@@ -17,10 +17,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pipeline.bench.disc import added_mass_kg
+from pipeline.bench.disc import effective_mass_kg
 from pipeline.bench.instrument import U_CRYSTAL
 from pipeline.bench.scene import Scene
-from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
+from pipeline.bench.spring import unstated_spring_kg
 from pipeline.motion.fit import Rows
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate
@@ -234,7 +234,7 @@ def find_relaxation(samples: Samples) -> Relaxation | NoOscillation | None:
     t, y = samples.track.t[used], samples.track.y[used]
     if t.size < 2 * FEWEST_FOR_CURVE:
         return None
-    noise = max(samples.noise, (samples.quantum or 0.0) / math.sqrt(12.0), 1e-4 * float(np.ptp(y)))
+    noise = max(samples.noise_of_reading, 1e-4 * float(np.ptp(y)))
     if not (noise > 0.0 and _moves(y, noise)):
         return None
     for first in _starts(y, noise):
@@ -396,7 +396,7 @@ def spring_constant(found: Relaxation, scene: Scene) -> dict[str, Estimate]:
     if scene.bob_mass_kg is None:
         return {}
     spring = scene.spring_mass_kg or unstated_spring_kg(scene.bob_mass_kg.value)
-    mass = oscillating_mass_kg(spring.value, scene.bob_mass_kg.value + added_mass_kg(scene))
+    mass = effective_mass_kg(scene)
     u_mass = math.hypot(scene.bob_mass_kg.u, spring.u / 3.0)
     k = found.squared_frequency.value * mass
     relative = math.hypot(u_mass / mass, found.squared_frequency.u / found.squared_frequency.value)

@@ -23,8 +23,7 @@ from pipeline.windows.sinusoids import WindowSamples, refit, solve
 # Number of heights tried for the level, from the middle of the swing to its top. With 80, amplitudes of clipped records
 # move by up to 0.05 u, as measured by `python -m tests.trials.troubles --only clipped`.
 HEIGHTS = 40
-# Share of a plateau's samples below the level beyond which samples are left out. With 0.1, amplitudes of clipped
-# records of `python -m tests.golden` move by up to 0.1 u.
+# Probability that a sample of a plateau lies below the level beyond which samples are left out.
 SHARE_BEYOND = 0.05
 
 # Fraction of the amplitude within which the motion is never clipped, so that the sinusoid can be fitted: a sample lies
@@ -79,7 +78,7 @@ def find_clipping(samples: Samples, cycles: Cycles, windows: Windows) -> Samples
     """
     # A record whose crests are flat may show no noise at all.
     rounding = ROUNDING * float(np.max(np.abs(windows.amplitude)))
-    least_noise = max(samples.noise, (samples.quantum or 0.0) / math.sqrt(12.0), rounding)
+    least_noise = max(samples.noise_of_reading, rounding)
     unexplained = _of_windows(WindowSamples.sliced(samples, cycles.bounds), windows)
     if not any(_clipped_windows(unexplained, sign, least_noise) for sign in (1.0, -1.0)):
         return None

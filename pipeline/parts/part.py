@@ -138,7 +138,7 @@ def check_sinusoid(samples: Samples, windows: Windows) -> NoOscillation | None:
     if not size > 1e-12 * float(np.max(np.abs(windows.offset))):
         return NoOscillation(f"the {noun(unit)} does not follow the period of its spectrum")
     # Correlated noise, a drift or a random walk makes neighbouring samples more similar than white noise does.
-    noise = max(samples.noise, (samples.quantum or 0.0) / math.sqrt(12.0))
+    noise = samples.noise_of_reading
     # Both noises are estimated from the same n samples. For white noise the ratio of their squares has a variance of
     # 8.5/n. Five standard deviations are allowed: the largest difference in 2,000 records at -10 dB is 4.3.
     chance = 5.0 * math.sqrt(8.5 / max(float(np.sum(windows.count)), 1.0))

@@ -22,7 +22,7 @@ from pipeline.motion.fitted import Fitted, Phase
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.levels import FEWEST_FOR_LINE, MISFIT
 from pipeline.numerics.regression import solve_weighted
-from pipeline.track import F8, UNUSABLE, Quality, Track
+from pipeline.track import F8, Quality, Track
 from pipeline.windows.demodulate import Windows
 
 CURVE_POINTS = 200  # number of points of a drawn curve
@@ -150,7 +150,7 @@ def kinematics(track: Track, fitted: Fitted, laws: Sequence[Weighted]) -> Smooth
     """
     phase, windows = fitted.phase, fitted.windows
     known = np.isfinite(track.t) & ((windows.flags & Quality.OUTSIDE) == 0)
-    used = known & ((windows.flags & UNUSABLE) == 0)
+    used = known & windows.used
     t = np.where(known, track.t, phase.t0)
     elapsed = np.clip(t, phase.t0, float(np.max(track.t[used]))) - phase.t0
     best = fitted.damping.best

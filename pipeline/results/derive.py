@@ -117,25 +117,17 @@ class Derived:
 
 
 def derive(
-    track: Track, fitted: Fitted, scene: Scene, effects: tuple[Effect, ...], misfits: tuple[Misfit, ...] = ()
+    track: Track, fitted: Fitted, scene: Scene, effects: tuple[Effect, ...], misfits: tuple[Misfit, ...]
 ) -> Derived:
-    """Calculate all results of a run and propagate their uncertainties.
+    """Calculate the results of a run by :mod:`pipeline.results.formulas`, and propagate their uncertainties.
 
     Results that depend on values missing in the scene are left out; the effects table says which masses are included.
     Misfits are inputs of kind B with the mean zero. Uncertainties are propagated to first order (JCGM 100:2008) by the
     ``uncertainties`` package, with one variable for each input. The clock's rate r and the scale s of the distances are
     uncertain: :math:`\\omega = r\\omega_r`, :math:`A_0 = s a_0` and :math:`\\beta = r b/s`, each from the record.
 
-    The spring constant is :math:`k = (\\omega^2 + \\overline{\\lambda^2}) m_s/x^2` with :math:`x \\tan x = m_s/(m +
-    m_a)`, the quality factor :math:`Q = \\omega_0/2\\lambda` with :math:`\\lambda = -\\dot A/A` at the start. It is
-    exact for linear drag; for other laws it is :math:`2\\pi` times the energy over the loss in a period, to first order
-    in the damping. The drag coefficient is :math:`C = 3\\pi m \\beta/(2 \\omega \\rho S)` (K. Lelas, R. Pezer,
-    arXiv:2502.07458).
-
-    If an acceleration of amplitude a is recorded, the amplitude of the displacement is :math:`a/(\\omega^2 +
-    \\lambda^2)`; for a velocity it is :math:`v/\\sqrt{\\omega^2 + \\lambda^2}`, and that of an angle follows from its
-    rate alike. For angles, voltages, forces and numbers, results that need a length are left out. The spring constant
-    needs none.
+    The quality factor is exact for linear drag; for other laws it is :math:`2\\pi` times the energy over the loss in a
+    period, to first order in the damping. The drag coefficient is that of K. Lelas, R. Pezer, arXiv:2502.07458.
 
     Results that depend on the damping law are averages over laws (:func:`pipeline.damping.average.average_over_laws`):
     :math:`x = \\sum_i w_i x_i` and :math:`u^2 = \\sum_i w_i (u_i^2 + (x_i - x)^2)`.

@@ -30,8 +30,8 @@ SPIKE_SIGMAS = 8.0
 # Least ratio of the number of samples in a plateau to that in the band of equal width beneath it. For an unclipped
 # crest the ratio is 1 / (sqrt 2 - 1) = 2.4; it is below 3.8 in 90 % of the recordings of `python -m tests.golden`.
 CONTRAST = 5.0
-# Time between two samples, in sample intervals, above which they are no neighbours: that of a filter over five samples.
-# From 3 to 8, one recording changes, as measured by `python -m tests.golden`.
+# Time between two samples, in sample intervals, above which they are no neighbours: the length of the filter of spikes.
+# If every second sample is missing by chance, a longer gap has a probability of 3 %.
 GAP = 5.0
 
 
@@ -69,6 +69,11 @@ class Samples:
         """(n,) bool: True for samples without any flag that excludes them."""
         mask: NDArray[np.bool_] = (self.flags & UNUSABLE) == 0
         return mask
+
+    @property
+    def noise_of_reading(self) -> float:
+        """The noise of one sample, at least that of rounding to the resolution, in the record's unit."""
+        return max(self.noise, (self.quantum or 0.0) / math.sqrt(12.0))
 
     def less(self, taken: F8) -> Samples:
         """Return the record with values (n,) subtracted from its distances; flags and times are kept."""

@@ -8,9 +8,9 @@ the group ``springmass.integrators``; :func:`springmass.testing.check` tests it.
 from __future__ import annotations
 
 from failure.extensions import entry_points_of, load_named
+from pipeline.bench.disc import effective_mass_kg as effective_mass_kg
 from pipeline.dynamics.equation import Equation as Equation
 from pipeline.dynamics.equation import Problem as Problem
-from pipeline.dynamics.equation import effective_mass_kg as effective_mass_kg
 from pipeline.dynamics.integrator import Integrator as Integrator
 from pipeline.dynamics.integrator import Trajectory as Trajectory
 from pipeline.dynamics.strang import EXACT, STRANG

@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.bench.disc import effective_mass_kg
 from pipeline.bench.scene import Scene
 from pipeline.damping.laws.drag import amplitudes
-from pipeline.dynamics.equation import Problem, effective_mass_kg
+from pipeline.dynamics.equation import Problem
 from pipeline.errors import DynamicsError
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.track import C16, F8

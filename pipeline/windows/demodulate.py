@@ -19,7 +19,7 @@ from pipeline.errors import AnalysisError
 from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_LINE, NOTICEABLE, OUTLIER, normal_quantile
 from pipeline.numerics.robust import mad_sigma, median
 from pipeline.samples.condition import Samples
-from pipeline.track import F8, U8, Quality
+from pipeline.track import F8, U8, UNUSABLE, Quality
 from pipeline.windows.cycles import Cycles
 from pipeline.windows.sinusoids import Tuning, WindowFits, WindowSamples, quantile, refit, retune, solve, unwrap
 
@@ -67,6 +67,11 @@ class Windows:
     residual: F8  # (n,) m, every sample less its window's fit; NaN for samples outside all windows or not measured
     flags: U8  # (n,) flags from the conditioning, with the false echoes found here
     lost: int  # number of windows with too few usable samples, which give no point
+
+    @property
+    def used(self) -> NDArray[np.bool_]:
+        """(n,) bool: True for samples without any flag that excludes them."""
+        return np.asarray((self.flags & UNUSABLE) == 0, np.bool_)
 
     @cached_property
     def noise(self) -> float:

@@ -120,7 +120,7 @@ def source(
     address = os.fspath(what)
     if not re.fullmatch(r"/dev/.*|.*://.*|COM\d+", address, re.IGNORECASE | re.DOTALL):
         ports = 'a port is named like "/dev/ttyUSB0", "COM3" or "socket://HOST:PORT"'
-        raise ProgramError(f"{address}: there is no such file", f"check the name, {ports}", exit_code=UNREADABLE)
+        raise ProgramError(f"{address}: there is no such file", f"check the name, {ports}", UNREADABLE)
     _refuse(address, how if speed == 1.0 else {"speed": speed, **how})
     return _Live(address, sensor, baud, scene_from(scene))
 

@@ -81,7 +81,7 @@ def position(a: Analysis, notes: Sequence[ChartNote] = ()) -> Chart:
 
 def used_samples(a: Analysis) -> NDArray[np.bool_]:
     """Return which samples the analysis used."""
-    return np.asarray(((a.flags & UNUSABLE) == 0) & np.isfinite(a.track.y) & np.isfinite(a.track.t), np.bool_)
+    return np.asarray(a.used & np.isfinite(a.track.y) & np.isfinite(a.track.t), np.bool_)
 
 
 def _reason(flags: int, y: float) -> str:

@@ -95,7 +95,7 @@ def _demand_free(targets: Sequence[Path], overwrite: bool) -> None:
 def _give_back(loaded: Loaded, out: Path, overwrite: bool) -> list[Path]:
     if not loaded.originals:
         raise ProgramError(
-            f"{loaded.path}: no original file travels inside this run", "nothing to give back", exit_code=UNREADABLE
+            f"{loaded.path}: no original file travels inside this run", "nothing to give back", UNREADABLE
         )
     if out.is_dir():
         # Names are external input, so only their last part is used for the path.

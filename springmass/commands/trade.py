@@ -49,9 +49,7 @@ def trade(
         analysis = Run.of(recording, given_scene, AnalysisOptions(**reading.options.given())).analysis
         analysis.track.demand_length("a simulation of the motion")
         if not isinstance(analysis.motion, Oscillation):
-            raise ProgramError(
-                f"{recording}: {analysis.motion.why}", "name a run that oscillates", exit_code=UNREADABLE
-            )
+            raise ProgramError(f"{recording}: {analysis.motion.why}", "name a run that oscillates", UNREADABLE)
         motion = motion_of(analysis, analysis.motion)
     elif given_scene is not None:
         from springmass.simulations.simulation import prepare

@@ -50,7 +50,7 @@ def compare_rows(rows: Sequence[Mapping[str, Any]]) -> CourseComparison:
     moving = [row for row in rows if row["status"] == "ok"]
     if len(moving) < 2:
         raise ProgramError(
-            f"compare needs two runs with a period, got {len(moving)}", "name a larger course", exit_code=UNREADABLE
+            f"compare needs two runs with a period, got {len(moving)}", "name a larger course", UNREADABLE
         )
     by = next(name for name in BENCHES if any(name in row for row in moving))
     courses = {row[COURSE] for row in moving}

@@ -138,7 +138,7 @@ def _until_one_dies(
                             raise
                         reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
                         wrong, remedy = f"{by.address}: a run failed ({reason})", "run springmass batch again"
-                        raise ProgramError(wrong, remedy, exit_code=SOME_FAILED) from error
+                        raise ProgramError(wrong, remedy, SOME_FAILED) from error
                 yield done
         finally:
             for future in running:

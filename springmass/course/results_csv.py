@@ -86,7 +86,7 @@ def read_rows(folder: str | os.PathLike[str]) -> tuple[list[dict[str, Any]], tup
             raise ValueError(f"no column {missing[0]}")
         found = [{name: _value(name, row[name]) for name in names} for row in rows]
     except (OSError, ValueError, TypeError, csv.Error) as error:
-        raise ProgramError(f"{path}: damaged ({error})", "run springmass batch again", exit_code=UNREADABLE) from error
+        raise ProgramError(f"{path}: damaged ({error})", "run springmass batch again", UNREADABLE) from error
     return found, tuple(name for name in names if name not in RESERVED)
 
 

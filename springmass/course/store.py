@@ -72,7 +72,7 @@ class Store:
                 raise ProgramError(f"{self._path.parent}: in use by another process", "wait for its end") from error
             if error.sqlite_errorname in ("SQLITE_NOTADB", "SQLITE_CORRUPT", "SQLITE_ERROR"):
                 remedy = "remove it, and batch analyses all runs again"
-                raise ProgramError(f"{self._path}: damaged ({error})", remedy, exit_code=UNREADABLE) from error
+                raise ProgramError(f"{self._path}: damaged ({error})", remedy, UNREADABLE) from error
             problem = f"could not be written ({error})"
             raise WriteFailed(self._path, problem, "check the disk space and the permissions") from error
 

@@ -91,7 +91,7 @@ def _in_folder(
         )
     except OSError as error:
         raise ProgramError(
-            f"{folder}: cannot read the folder ({error.strerror})", "name another", exit_code=UNREADABLE
+            f"{folder}: cannot read the folder ({error.strerror})", "name another", UNREADABLE
         ) from error
     names = {path.name for path in files}
     pairs = {path.name: name for path in files if (name := _velocity_of(path)) in names}

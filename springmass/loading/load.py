@@ -83,7 +83,7 @@ def _load_stdin(options: LoadOptions) -> Loaded:
     with tempfile.TemporaryDirectory(prefix="springmass-") as folder:
         spooled = Path(folder) / "stdin"
         if sys.stdin is None:
-            raise ProgramError("standard input is closed", "name a file", exit_code=UNREADABLE)
+            raise ProgramError("standard input is closed", "name a file", UNREADABLE)
         with open(spooled, "wb") as file:
             shutil.copyfileobj(sys.stdin.buffer, file)
         try:
@@ -102,9 +102,7 @@ def sample_data() -> Path:
     folder = part("sample_data")
     if (folder / "undamped_simulated_position.txt").is_file():
         return folder
-    raise ProgramError(
-        f"{folder}: the bundled recordings are missing", "install springmass again", exit_code=UNREADABLE
-    )
+    raise ProgramError(f"{folder}: the bundled recordings are missing", "install springmass again", UNREADABLE)
 
 
 def _refuse(path: Path, what: str, options: LoadOptions, allowed: Sequence[str]) -> None:

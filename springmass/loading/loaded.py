@@ -100,9 +100,7 @@ class Loaded:
         if not self.originals_inside:
             return self.recording.originals
         if sha256_of(self.path) != self.sha256:
-            raise ProgramError(
-                f"{self.path}: the file has changed since it was loaded", "load it again", exit_code=UNREADABLE
-            )
+            raise ProgramError(f"{self.path}: the file has changed since it was loaded", "load it again", UNREADABLE)
         with open_run(self.path, unverified=any(trap.code == UNVERIFIED for trap in self.traps)) as run:
             return run.originals()
 

@@ -6,7 +6,6 @@ import numpy as np
 
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.results.curves import Smoothed
-from pipeline.track import UNUSABLE
 from pipeline.units import Unit, noun
 
 MOST_ROWS = 1_000_000
@@ -39,7 +38,7 @@ def motion_csv(analysis: Analysis, smoothed: Smoothed) -> str:
     missing distance, or the motion at a sample without a time or outside the analysed part. Records of more than a
     million samples have a line for every second or third sample.
     """
-    used = (analysis.flags & UNUSABLE) == 0
+    used = analysis.used
     orders = ("position", "velocity", "acceleration")
     motion = [getattr(smoothed, f"{u}{name}") for name in orders for u in ("", "u_")]
     every = -(-len(analysis.track) // MOST_ROWS)

@@ -8,7 +8,6 @@ from pipeline.analyse import Analysis, Oscillation, Still
 from pipeline.damping.laws import words_of
 from pipeline.quantities import INPUTS
 from pipeline.results.budget import Contribution
-from pipeline.track import UNUSABLE
 from pipeline.units import noun
 from springmass.result.advice import harm_of, sentence
 from springmass.result.budget_tables import budgets_of
@@ -61,7 +60,7 @@ def damping_sentence(analysis: Analysis) -> str:
         return ""
     damping, quoted = analysis.motion.damping, analysis.motion.derived.quoted
     chosen = words_of(damping.best.law)
-    used = analysis.track.t[(analysis.flags & UNUSABLE) == 0]
+    used = analysis.track.t[analysis.used]
     span = f"{float(used.max() - used.min()):.0f} s"
     if damping.best.rejected and damping.by_statement:
         return (

@@ -84,7 +84,7 @@ class OpenSensor:
         if heard:
             what = describe_bytes(heard, self.options if self.family.name == "text-lines" else None)
         wrong = f"{self.port.name}: a {self.family.name} sensor at {self.baud} baud was expected, {what}"
-        return ProgramError(wrong, "see `springmass ports` for --sensor and --baud", exit_code=SENSOR)
+        return ProgramError(wrong, "see `springmass ports` for --sensor and --baud", SENSOR)
 
 
 def meeting(sensor: OpenSensor, identity: Identity) -> Iterator[str]:

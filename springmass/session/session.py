@@ -157,9 +157,7 @@ class Session:
     def _end_unheard(self, channel: int) -> None:
         self.stop()
         if channel in self._tee.gone:
-            raise ProgramError(
-                self._tee.gone[channel], "is a sensor connected, and is this its port?", exit_code=SENSOR
-            )
+            raise ProgramError(self._tee.gone[channel], "is a sensor connected, and is this its port?", SENSOR)
         raise self.sensors[channel].not_heard(self._tee.heard(channel))
 
     def still(self, seconds: float = 3.0) -> StillPoint:

@@ -14,7 +14,7 @@ from pipeline.analysis import Analysis
 from pipeline.numerics.estimate import Estimate
 from pipeline.simulation import Problem, Trajectory
 from pipeline.simulation.band import Band
-from pipeline.track import C16, F8, UNUSABLE
+from pipeline.track import C16, F8
 from springmass.simulations.from_run import oscillation_of
 
 WIDER = 1.96  # standard deviations of the noise by which the band is widened, for 95 %
@@ -77,8 +77,8 @@ def compare_with_run(
     """
     motion, used = oscillation_of(analysis), analysis.samples.used
     t, measured = analysis.track.t[used], analysis.track.y[used]
-    rest, good = motion.rest.at(t), (analysis.flags[used] & UNUSABLE) == 0
-    free = tuple(each[good] for each in (t - t[0], measured - rest, motion.waveform.velocity[used]))
+    rest, good = motion.rest.at(t), analysis.used[used]
+    free = (t - t[0])[good], (measured - rest)[good], motion.waveform.velocity[used][good]
     predicted: F8 = rest + trajectory.at(t - t[0])
     rms = float(np.sqrt(np.mean((measured - predicted) ** 2)))
     noise = analysis.estimates["noise"].value

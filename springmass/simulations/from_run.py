@@ -69,9 +69,7 @@ def oscillation_of(analysis: Analysis) -> Oscillation:
     """Return the oscillation of a run; refuse a run without one."""
     if not isinstance(analysis.motion, Oscillation):
         raise ProgramError(
-            f"{analysis.motion.why}: nothing to lay a prediction over",
-            "name a run that oscillates",
-            exit_code=UNREADABLE,
+            f"{analysis.motion.why}: nothing to lay a prediction over", "name a run that oscillates", UNREADABLE
         )
     return analysis.motion
 

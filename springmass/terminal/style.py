@@ -6,8 +6,8 @@ import os
 from dataclasses import dataclass
 from typing import TextIO
 
-from pipeline.numerics.estimate import Estimate, UpperLimit, format_value, in_brackets
-from springmass.typeset import page_unit, prefixed, pretty, typeset
+from pipeline.numerics.estimate import Estimate, format_value, in_brackets
+from springmass.typeset import prefixed, pretty
 
 WIDEST = 100
 
@@ -50,12 +50,9 @@ def shown(estimate: Estimate | None, style: TerminalStyle, *, brackets: bool = F
     if estimate is None:
         return "-"
     chosen = estimate if style.si else prefixed(estimate)
-    if isinstance(chosen, UpperLimit):
-        return pretty(chosen) if style.unicode else str(chosen).replace("µ", "u")
-    write = in_brackets if brackets else format_value
     if style.unicode:
-        return f"{typeset(write(chosen.value, chosen.u))} {page_unit(chosen.unit)}".rstrip()
-    return write(chosen.value, chosen.u, chosen.unit.replace("µ", "u"))
+        return pretty(chosen, in_brackets if brackets else format_value)
+    return (repr(chosen) if brackets else str(chosen)).replace("µ", "u")
 
 
 def concise(estimate: Estimate | None, style: TerminalStyle) -> str:

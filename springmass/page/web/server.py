@@ -293,7 +293,7 @@ def address_in_network() -> str:
             probe.connect(ELSEWHERE)
         except OSError as error:
             raise ProgramError(
-                f"--lan: no network ({error.strerror})", "join one, or leave --lan out", exit_code=SENSOR
+                f"--lan: no network ({error.strerror})", "join one, or leave --lan out", SENSOR
             ) from error
         return str(probe.getsockname()[0])
 
