@@ -55,7 +55,7 @@ class Stated(_Field[Estimate | float | str | tuple[float, float], Estimate]):
         return f"at least {self.least:g}{unit} and at most {self.greatest:g}"
 
     def checked(self, given: Any, where: str) -> Estimate:
-        """Return an estimate of a number, a text with its unit, a pair (value, u), a table of the two or an estimate."""
+        """Return the estimate of a number, of a text with its unit, of a pair (value, u), or of a table of the two."""
         table, key = self.place
         name = f"{where}: [{table}] {key}"
         value, u, unit = given, 0.0, ""
