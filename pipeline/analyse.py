@@ -14,6 +14,7 @@ from pipeline.bench.scene import Scene
 from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.checks.echoes import echoes_by_chance, find_clusters
 from pipeline.checks.judge import judge
+from pipeline.checks.residual import COARSE
 from pipeline.closed import overdamped, still, two_modes, without_period
 from pipeline.damping.select import Damping, fit_laws
 from pipeline.findings.finding import worded
@@ -72,7 +73,8 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
         return without_period(samples, why, scene, options)
     windows, modes = separate(samples, part.cycles, part.windows, sought=options.modes)
     windows = rounded(windows, samples.quantum)
-    laws = fit_laws(windows, start_of(samples, windows.angular_frequency), options.laws, options.known_law, track.unit)
+    begin, coarse = start_of(samples, windows.angular_frequency), (samples.quantum or 0.0) > COARSE * windows.noise
+    laws = fit_laws(windows, begin, options.laws, options.known_law, track.unit, coarse=coarse)
 
     # For strong damping, or friction that stops the bob, the equation of motion is fitted, not its cycle average.
     solved = fit_equation(samples, windows, laws, stopped=part.stopped)

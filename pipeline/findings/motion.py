@@ -97,7 +97,10 @@ def damping_findings(damping: Damping) -> Iterator[Notice]:
     rejected = [name for name, fit in damping.fits.items() if fit.rejected]
     if damping.fits and len(rejected) == len(damping.fits):
         nearest = min(damping.fits.values(), key=lambda fit: fit.reduced_chi2) if damping.by_statement else damping.best
-        yield Notice("no_law_fits", {"reduced_chi2": nearest.reduced_chi2, "nearest": words_of(nearest.law)})
+        rival = damping.fits.get(nearest.beaten_by)
+        driven = None if rival is None else words_of(rival.law)
+        chi2 = nearest.reduced_chi2
+        yield Notice("no_law_fits", {"reduced_chi2": chi2, "nearest": words_of(nearest.law), "driven": driven})
     elif damping.growth_rate:
         yield Notice("growing", {"growth_rate": damping.growth_rate})
     elif damping.stated:
@@ -133,7 +136,8 @@ def _reasons(damping: Damping) -> dict[str, str]:
     by_reason: dict[str, list[str]] = {}
     for fit in damping.fits.values():
         by_reason.setdefault(fit.rejection, []).append(f"{words_of(fit.law)}{_chi2(fit)}")
-    reasons = {reason: ", ".join(laws) for reason, laws in by_reason.items() if reason in ("misfit", "negative")}
+    shown = ("misfit", "negative", "beaten")
+    reasons = {reason: ", ".join(laws) for reason, laws in by_reason.items() if reason in shown}
     if "misfit" in by_reason:
         reasons["selected"] = f"{words_of(best.law)}{_chi2(best)}"
     unfitted = [f"{name}, because {why}" for name, why in damping.unfitted.items()]

@@ -20,6 +20,7 @@ from pipeline.damping.average import Weighted, average_over_laws, scaled
 from pipeline.damping.law_fit import LawFit, mean_squared_rate
 from pipeline.damping.laws import Drag, Law, free_power
 from pipeline.damping.laws.drag import COEFFICIENTS
+from pipeline.damping.local import local_decay
 from pipeline.damping.select import Damping
 from pipeline.motion.fitted import Fitted, Phase
 from pipeline.numerics.estimate import Estimate, Joint, UpperLimit
@@ -342,6 +343,13 @@ class _Laws:
             joint = Joint(("amplitude", "damping_rate", "displacement"), np.zeros(3), covariance, ("m", "1/s", "m"))
             quantities = quantities + np.array(inputs.add_joint("choice_of_law", joint, "A"))
         self.start, self.rate_at_start, self.root_mean_square = quantities.tolist()
+        if damping.by_statement or damping.admissible:
+            return
+        expected = self.stated.amplitude(elapsed)
+        local = local_decay(elapsed, windows.amplitude, expected, damping.scatter, best.joint.units[0])
+        if local is not None:
+            self.values = np.array([*local.values, self.values[2]])
+            self.start, self.rate_at_start = inputs.add_joint("local_decay", local, "A")
 
     def coefficients(self, rate: Any, scale: Any, lam: Any, start: Any) -> dict[str, tuple[Any, str]]:
         """Return the coefficients of the law of the results, in true seconds and metres.
