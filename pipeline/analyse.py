@@ -54,6 +54,8 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
     scene, options = scene or Scene(), options or Options()
     if options.stated is None and scene.damping_law is not None:
         options = replace(options, stated=scene.damping_law)
+    if (ppm := scene.sensor_clock_ppm) is not None:
+        track = replace(track, clock_rate=(1e-6 * ppm.value, 1e-6 * ppm.u))
     if track.unit == "m" and track.sigma_m is None and scene.sensor_sigma_m is not None:
         track = replace(track, sigma_m=scene.sensor_sigma_m.value)
     part = find_part(condition(track))
@@ -75,7 +77,7 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
         kind = kind_findings(motion, derived.estimates)
         shown = (kind, notices, sample_findings(samples, motion.flags, samples.noise))
     # A missing or wrong mass changes the spring constant more than anything that the recording shows.
-    bench = scene_findings(scene, effects, constant=constant) if constant or effects else ()
+    bench = scene_findings(scene, effects, derived.estimates) if constant or effects else ()
     return Analysis(
         track=track,
         scene=scene,
