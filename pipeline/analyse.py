@@ -60,6 +60,8 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
     scene, options = scene or Scene(), options or Options()
     if options.stated is None and scene.damping_law is not None:
         options = replace(options, stated=scene.damping_law)
+    if (ppm := scene.sensor_clock_ppm) is not None:
+        track = replace(track, clock_rate=(1e-6 * ppm.value, 1e-6 * ppm.u))
     if track.unit == "m" and track.sigma_m is None and scene.sensor_sigma_m is not None:
         track = replace(track, sigma_m=scene.sensor_sigma_m.value)
     samples = condition(track)
@@ -93,7 +95,7 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
     findings = worded(
         track.unit,
         # A missing or wrong mass changes the spring constant more than anything that the recording shows.
-        scene_findings(scene, effects, constant="spring_constant" in derived.estimates),
+        scene_findings(scene, effects, derived.estimates),
         part_findings(part.partition, float(track.t[0]), float(track.t[-1])),
         motion_findings(part.cycles, fitted),
         damping_findings(fitted.damping),
