@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from acquisition.errors import visible
+from pipeline.damping.law_fit import LawFit
 from pipeline.damping.select import Damping
 from pipeline.numerics.estimate import Estimate, UpperLimit, format_limit, format_value, in_brackets
 
@@ -131,14 +132,26 @@ def page_unit(unit: str) -> str:
     return _POWER.sub(lambda power: (power[1] or power[2]).translate(_SUPERSCRIPT), unit)
 
 
+def rejection_of(fit: LawFit) -> str:
+    """Return that a law is rejected, and why."""
+    reasons = {
+        "misfit": f"chi-square above {pretty_number(fit.limit, 3)}",
+        "negative": "negative coefficient",
+        "beaten": f"worse than {fit.beaten_by}",
+        "differ": "coefficients differ",
+    }
+    return f"rejected: {reasons[fit.rejection]}"
+
+
 def law_status(damping: Damping, name: str) -> str:
-    """Return the status of a law in a few words."""
+    """Return the status of a law in a few words, and why it is rejected."""
+    fit = damping.fits[name]
     if name == damping.selected:
         if damping.by_statement:
-            return "stated, and rejected" if damping.fits[name].rejected else "stated"
-        return "rejected, yet the least bad" if damping.fits[name].rejected else "selected"
-    if damping.fits[name].rejected:
-        return "rejected"
+            return f"stated, and {rejection_of(fit)}" if fit.rejected else "stated"
+        return f"{rejection_of(fit)}, yet the least bad" if fit.rejected else "selected"
+    if fit.rejected:
+        return rejection_of(fit)
     return "admissible" if name in damping.admissible else "unlikely"
 
 

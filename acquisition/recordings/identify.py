@@ -7,6 +7,7 @@ The module of a format is imported on demand. Another package adds a format with
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -28,6 +29,11 @@ _MODULES = {
     "lvm": "lvm",
     "tdms": "tdms",
     "workbook": "workbook",
+    "arrays": "arrays",
+    "wav": "wav",
+    "json": "json_text",
+    "labchart": "lab_text:LABCHART",
+    "acqknowledge": "lab_text:ACQKNOWLEDGE",
     "zip": "archive",
     "capstone": "pasco:CAPSTONE",
     "datastudio": "pasco:DATASTUDIO",
@@ -174,16 +180,14 @@ def _begins(with_bytes: bytes) -> Callable[[bytes], bool]:
     return lambda head: head.startswith(with_bytes)
 
 
+_AS_XLSX = "open it in a spreadsheet and save it as xlsx or CSV"
+_HTML = re.compile(rb"(?:\xef\xbb\xbf)?\s*<(?:!doctype html|html|head|body|table|meta)\b", re.IGNORECASE)
 _CONTENTS = (
-    ("a MATLAB file", _begins(b"MATLAB 5.0 MAT"), 'in MATLAB writematrix([t x], "run.csv")'),
-    (
-        "an HDF5 file",
-        lambda head: b"\x89HDF\r\n\x1a\n" in head,
-        "if springmass made it, open it as a run file",
-    ),
     ("an OpenDocument file", lambda head: b"application/vnd.oasis.opendocument" in head[:200], _AS_CSV),
     ("a TDMS index", _begins(b"TDSh"), "name the .tdms file next to it"),
-    ("a numpy file", _begins(b"\x93NUMPY"), 'in Python numpy.savetxt("run.csv", array, delimiter=",")'),
+    ("a parquet file", _begins(b"PAR1"), 'in Python pandas.read_parquet("run.parquet").to_csv("run.csv")'),
+    ("XML of Excel 2003", lambda head: b"urn:schemas-microsoft-com:office:spreadsheet" in head, _AS_XLSX),
+    ("a web page (HTML)", lambda head: bool(_HTML.match(head)), _AS_XLSX),
     ("a page (PDF)", _begins(b"%PDF"), _TEXT),
     ("a picture", lambda head: head.startswith((b"\x89PNG", b"\xff\xd8\xff", b"GIF8")), _TEXT),
     (
@@ -205,6 +209,7 @@ _PROGRAMS = {
     ".isf": ("an oscilloscope's waveform", "save it as CSV at the oscilloscope"),
     ".opj": ("an Origin project", 'in Origin "File", "Export", "ASCII"'),
     ".opju": ("an Origin project", 'in Origin "File", "Export", "ASCII"'),
+    ".sr": ("a capture of sigrok", 'in PulseView "Save", "Export", "CSV"'),
     ".numbers": ("a Numbers sheet", 'in Numbers "File", "Export To", "CSV"'),
     ".mat": ("a MATLAB file", 'in MATLAB writematrix([t x], "run.csv")'),
     ".pkl": ("a pickle of Python", "save the numbers as CSV where they were made"),

@@ -8,11 +8,41 @@ import numpy as np
 
 from pipeline.checks.residual import Outcome, Residual
 from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_CURVE, MISFIT, NOTICEABLE, normal_quantile
-from pipeline.numerics.regression import chi2_quantile
+from pipeline.numerics.regression import chi2_quantile, correlation_length
+from pipeline.samples.condition import COARSE
 from pipeline.track import F8
-from pipeline.windows.demodulate import ROUNDING
+from pipeline.windows.demodulate import FINEST, ROUNDING
 
+# Degree of the polynomials of a slow change: a smooth curve through a run has four parameters and one more.
+SLOW = 4
 ALARM_OF_A_TEST = FALSE_ALARM / 3.0  # probability of a false alarm of each of the three tests that decide by one alone
+
+
+def slow_change(residual: Residual) -> Outcome | None:
+    """Test a fit to all samples for slow changes of amplitude, phase and rest position that it does not describe.
+
+    A misfit far below the noise of one sample is visible in its order. With the amplitude A and the phase of the fit,
+    the residuals are fitted by :math:`\\sum_k P_k(x)(a_k A\\cos\\varphi + b_k A\\sin\\varphi) + c_k P_k(\\tau)`, with
+    Legendre polynomials up to degree :data:`SLOW`. Time :math:`\\tau`, and the integral x of :math:`A^2`, of which each
+    part of the record contains equal information, are scaled to -1 to 1. The mean square of what this explains, over
+    that of the rest, follows the F distribution, because the noise is measured in the rest; its correlation counts.
+    """
+    from scipy.special import fdtrc
+
+    values, relative, t = residual.values, residual.relative, residual.samples.track.t[residual.rows]
+    coarse = (residual.samples.quantum or 0.0) / COARSE
+    if relative is None or not residual.enough or residual.noise <= max(FINEST * residual.amplitude, coarse):
+        return None
+    scaled = (2.0 * (x - x[0]) / (x[-1] - x[0]) - 1.0 for x in (np.cumsum(relative**2), t))
+    moving, still = (np.polynomial.legendre.legvander(x, SLOW) for x in scaled)
+    sides = (relative * np.cos(residual.phase), relative * np.sin(residual.phase))
+    design = np.concatenate([moving * side[:, None] for side in sides] + [still], axis=1)
+    explained = design @ np.linalg.lstsq(design, values, rcond=None)[0]
+    rest = values - explained
+    count, length = design.shape[1], correlation_length(rest)
+    free = (values.size - count) / length
+    ratio = float(explained @ explained) / count / (float(rest @ rest) / (values.size - count)) / length
+    return Outcome("model_misfit", {"slow_change": ratio}) if fdtrc(count, free, ratio) < FALSE_ALARM else None
 
 
 def excess(residual: Residual) -> Outcome | None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.checks.residual import PARTS, Misfit, Outcome, Residual
-from pipeline.numerics.levels import IMPROBABLE
+from pipeline.numerics.levels import IMPROBABLE, NEGLIGIBLE
 from pipeline.track import F8
 
 # Highest order of the harmonics that are sought; each further one adds IMPROBABLE to the probability of a false alarm.
@@ -70,19 +70,23 @@ def folded_shape(residual: Residual) -> Outcome | None:
         phase_rad=peak / amplitude,
         damping_rate=2.0 * moved / amplitude * fall / residual.seconds,
     )
-    share, total = peak / amplitude, float(power.sum())
-    even, second = float(power[order % 2 == 0].sum()) / total, float(power[order == 2].sum()) / total
-    if even > 0.9 and second > 0.95:
-        way = {"even": even}
-    elif even < 0.1:
-        way = {"odd": 1.0 - even}
-    else:
-        way = {"near_peak_m" if abs(wave[BINS // 2]) > abs(wave[0]) else "far_peak_m": peak}
+    share, way = peak / amplitude, _way(power, order, wave)
     numbers = None if share < REPORTED else {"peak_m": peak, "share": share, **way}
     explained = np.zeros(bins.size)
     for one, k in zip(each, order.tolist(), strict=True):
         explained += one[bins] if not falls or relative is None else one[bins] * relative**k
     return Outcome("not_sinusoidal", numbers, misfit, explained)
+
+
+def _way(power: F8, order: NDArray[np.int64], wave: F8) -> dict[str, float]:
+    """Return the share of even or odd harmonics if nearly all are, or else the end at which the wave is largest."""
+    total = float(power.sum())
+    even, second = float(power[order % 2 == 0].sum()) / total, float(power[order == 2].sum()) / total
+    if even > 1.0 - NEGLIGIBLE and second > 1.0 - 0.5 * NEGLIGIBLE:
+        return {"even": even}
+    if even < NEGLIGIBLE:
+        return {"odd": 1.0 - even}
+    return {"near_peak_m" if abs(wave[BINS // 2]) > abs(wave[0]) else "far_peak_m": float(np.max(np.abs(wave)))}
 
 
 def _folded(

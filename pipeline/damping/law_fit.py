@@ -24,7 +24,8 @@ from pipeline.numerics.levels import BARE_MENTION, COVERAGE, FALSE_ALARM, NEGLIG
 from pipeline.numerics.regression import chi2_quantile, solve_weighted
 from pipeline.track import F8
 
-Rejection = Literal["", "misfit", "differ", "negative"]  # "differ": the coefficients of several runs
+# "differ": the coefficients of several runs; "beaten": by a law that is rejected as negative
+Rejection = Literal["", "misfit", "differ", "negative", "beaten"]
 # A coefficient this many standard uncertainties below zero rejects its law: probability 0.023 if it is zero.
 NEGATIVE = normal_quantile(COVERAGE)
 
@@ -33,8 +34,8 @@ NEGATIVE = normal_quantile(COVERAGE)
 class LawFit:
     """The fit of one law to one record, and its test.
 
-    A law is rejected if chi-square is improbable, or if a coefficient is negative by more than two standard
-    uncertainties.
+    A law is rejected if chi-square is improbable, if a coefficient is negative by more than two standard uncertainties,
+    or if such a law fits better than every other one.
     """
 
     law: Law
@@ -44,6 +45,7 @@ class LawFit:
     bic: float  # of the best fit without negative coefficients, up to a constant that all laws share
     rejection: Rejection
     widening: float = 1.0  # factor of the covariance because chi-square rejects the law
+    beaten_by: str = ""  # name of the law with a negative coefficient that fits better
 
     @property
     def rejected(self) -> bool:
@@ -54,6 +56,16 @@ class LawFit:
     def name(self) -> str:
         """The name of the law."""
         return self.law.name
+
+    @property
+    def chi2(self) -> float:
+        """Chi-square of points of which the correlation counts several as one."""
+        return self.reduced_chi2 * self.dof
+
+    @property
+    def limit(self) -> float:
+        """The reduced chi-square from which the law is rejected."""
+        return chi2_quantile(1.0 - FALSE_ALARM, self.dof) / self.dof
 
     def drag_term(self, name: str) -> float | None:
         """Return a coefficient of friction ("mu"), linear ("gamma") or quadratic ("beta") drag.
@@ -178,11 +190,35 @@ def weigh(law: Law, fit: Fit, least_chi2: float, points: int, correlation: float
     reduced = fit.cost / free if free > 0 else math.nan
     bic = least_chi2 / correlation + count * math.log(max(points / correlation, 2.0))
     rejection: Rejection = ""
-    if dof > 0 and reduced * dof > chi2_quantile(1.0 - FALSE_ALARM, dof):
+    if dof > 0 and reduced > chi2_quantile(1.0 - FALSE_ALARM, dof) / dof:
         rejection = "misfit"
     elif np.any(fit.values < -NEGATIVE * np.sqrt(np.diag(covariance))):
         rejection = "negative"
     return LawFit(law, joint_of(law, fit.values, covariance, unit), reduced, dof, bic, rejection)
+
+
+def without_beaten(fits: Mapping[str, LawFit]) -> dict[str, LawFit]:
+    """Reject all laws if one with a negative coefficient fits better than each of them: then no law holds.
+
+    A better fit of a law that drives the motion does not support the laws that damp it. Its chi-square must be lower
+    than each of theirs by the quantile for the number of additional parameters, or for one, at :data:`FALSE_ALARM`
+    divided by the number of laws.
+    """
+    allowed = [fit for fit in fits.values() if not fit.rejected]
+    rivals = [fit for fit in fits.values() if fit.rejection == "negative"]
+    if not allowed or not rivals:
+        return dict(fits)
+
+    def margin(fit: LawFit, rival: LawFit) -> float:
+        more = max(len(rival.law.parameters) - len(fit.law.parameters), 1)
+        return fit.chi2 - rival.chi2 - chi2_quantile(1.0 - FALSE_ALARM / len(fits), more)
+
+    least, best = max((min(margin(fit, rival) for fit in allowed), rival.name) for rival in rivals)
+    if not least > 0.0:
+        return dict(fits)
+    return {
+        name: fit if fit.rejected else replace(fit, rejection="beaten", beaten_by=best) for name, fit in fits.items()
+    }
 
 
 def choose(fits: Mapping[str, LawFit], evidence: float, span: Callable[[str], F8]) -> tuple[str, tuple[str, ...]]:

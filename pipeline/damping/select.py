@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pipeline.damping.law_fit import NEGATIVE, LawFit, choose, fit_law, least_chi2, weigh
+from pipeline.damping.law_fit import NEGATIVE, LawFit, choose, fit_law, least_chi2, weigh, without_beaten
 from pipeline.damping.laws import LAWS, Drag, Law, find_law, free_power
 from pipeline.errors import AnalysisError
 from pipeline.numerics.least_squares import Fit
@@ -79,6 +79,8 @@ def fit_laws(
     laws: Sequence[str | Law] = tuple(LAWS),
     stated: str | Law | None = None,
     unit: str = "m",
+    *,
+    coarse: bool = False,
 ) -> Damping:
     """Fit the damping laws to the windows' amplitudes; times count from ``t0``.
 
@@ -91,6 +93,9 @@ def fit_laws(
     points. If chi-square rejects a law, its covariance comes from the size and the correlation length of its own
     residuals.
 
+    ``coarse`` says that rounding to steps larger than the noise makes most of the scatter. It has a pattern, which a
+    law that drives the motion may follow better than others; then no such law rejects them.
+
     Only unbounded estimates of drag coefficients are unbiased and have correct intervals. So the fits are unbounded,
     and a coefficient that is negative by more than two standard uncertainties rejects its law.
     """
@@ -101,7 +106,7 @@ def fit_laws(
         noise = np.hypot(noise, amplitude * windows.decay * t)
     # Even for computed data the windows are not exact.
     noise = np.maximum(noise, ROUNDING * float(np.max(amplitude)) + 1e-100)
-    points = _Points(t, amplitude, noise, scatter(t, amplitude, noise))
+    points = _Points(t, amplitude, noise, scatter(t, amplitude, noise), coarse)
     known = None if stated is None else find_law(stated)
     found = _fit_laws(points, t0, laws, known, unit)
     # No wrong law is stated because only a few laws were tried to save time.
@@ -136,6 +141,7 @@ class _Points:
     amplitude: F8
     noise: F8
     spread: Scatter
+    coarse: bool  # whether rounding makes most of the scatter
     found: dict[str, Fit] = field(default_factory=dict)
 
     @property
@@ -162,7 +168,7 @@ def _fit_laws(points: _Points, t0: float, wanted: Sequence[str | Law], known: La
         fits, unfitted = _weighed(laws, points, unit)
     if not fits:
         raise AnalysisError("no damping law could be fitted to the amplitudes", "see the counts of flagged samples")
-    fits = _with_growth(fits)
+    fits = _with_growth(fits if points.coarse else without_beaten(fits))
     stated = "" if known is None else known.name
     selected, admissible = select_law(fits, stated, float(points.t[-1]))
     return Damping(

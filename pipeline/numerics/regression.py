@@ -82,7 +82,7 @@ def covariance_of(jacobian: F8) -> F8:
     return root @ root.T if independent else unknown
 
 
-def scatter(t: F8, y: F8, u: F8, *, degree: int = DEGREE) -> Scatter:
+def scatter(t: F8, y: F8, u: F8) -> Scatter:
     """Measure the scatter of points about a smooth curve that is independent of any damping law.
 
     The excess, added in quadrature, makes the uncertainties agree with the spread of the residuals, which is corrected
@@ -90,7 +90,7 @@ def scatter(t: F8, y: F8, u: F8, *, degree: int = DEGREE) -> Scatter:
     eight points nothing is measured and ``u`` is kept.
     """
     n = t.size
-    degree = min(degree, n // 4 - 1)
+    degree = min(DEGREE, n // 4 - 1)
     everything = np.ones(n, np.bool_)
     if degree < 1:
         return Scatter(u, 0.0, everything, 1.0)
@@ -117,12 +117,12 @@ def scatter(t: F8, y: F8, u: F8, *, degree: int = DEGREE) -> Scatter:
     return Scatter(total, excess, kept, correlation_length(residual[kept] / total[kept]))
 
 
-def smooth_curve(t: F8, y: F8, spread: Scatter, *, degree: int = DEGREE) -> tuple[Legendre, float]:
+def smooth_curve(t: F8, y: F8, spread: Scatter) -> tuple[Legendre, float]:
     """Return a polynomial through points, and the amount by which its BIC is below that of the mean."""
     kept = spread.kept
     values, weight = y[kept], 1.0 / spread.u[kept]
     mean = float(np.average(values, weights=weight**2))
-    order = min(degree, t.size // 4 - 1)
+    order = min(DEGREE, t.size // 4 - 1)
     if order < 1:
         return Legendre([mean]), 0.0
     ends = [float(t[0]), float(t[-1])]

@@ -23,8 +23,7 @@ from pipeline.windows.sinusoids import WindowSamples, refit, solve
 # Number of heights tried for the level, from the middle of the swing to its top. With 80, amplitudes of clipped records
 # move by up to 0.05 u, as measured by `python -m tests.trials.troubles --only clipped`.
 HEIGHTS = 40
-# Share of a plateau's samples below the level beyond which samples are left out. With 0.1, amplitudes of clipped
-# records of `python -m tests.golden` move by up to 0.1 u.
+# Probability that a sample of a plateau lies below the level beyond which samples are left out.
 SHARE_BEYOND = 0.05
 
 # Fraction of the amplitude within which the motion is never clipped, so that the sinusoid can be fitted: a sample lies

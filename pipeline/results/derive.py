@@ -20,14 +20,20 @@ from pipeline.damping.average import Weighted, average_over_laws, scaled
 from pipeline.damping.law_fit import LawFit, mean_squared_rate
 from pipeline.damping.laws import Drag, Law, free_power
 from pipeline.damping.laws.drag import COEFFICIENTS
+from pipeline.damping.local import local_decay
 from pipeline.damping.select import Damping
+from pipeline.motion.at_rest import Rest
 from pipeline.motion.fitted import Fitted, Phase
+from pipeline.motion.kinds import FittedMotion
+from pipeline.motion.relaxation import Relaxation
+from pipeline.motion.two_modes import TwoModes
 from pipeline.numerics.estimate import Estimate, Joint, UpperLimit
 from pipeline.numerics.levels import LIMIT
 from pipeline.numerics.robust import U_OF_MAD, mad_sigma
 from pipeline.quantities import QUANTITIES
 from pipeline.results.ambient import Ambient
 from pipeline.results.budget import Budget, Inputs, function_of, joint_of
+from pipeline.results.closed_form import closed_form
 from pipeline.results.curves import Curve, drag_curve, energy_curve
 from pipeline.results.effects import Effect
 from pipeline.results.formulas import solve
@@ -117,33 +123,27 @@ class Derived:
 
 
 def derive(
-    track: Track, fitted: Fitted, scene: Scene, effects: tuple[Effect, ...], misfits: tuple[Misfit, ...] = ()
+    track: Track, motion: FittedMotion, scene: Scene, effects: tuple[Effect, ...], misfits: tuple[Misfit, ...]
 ) -> Derived:
-    """Calculate all results of a run and propagate their uncertainties.
+    """Calculate the results of a run by :mod:`pipeline.results.formulas`, and propagate their uncertainties.
 
     Results that depend on values missing in the scene are left out; the effects table says which masses are included.
     Misfits are inputs of kind B with the mean zero. Uncertainties are propagated to first order (JCGM 100:2008) by the
     ``uncertainties`` package, with one variable for each input. The clock's rate r and the scale s of the distances are
     uncertain: :math:`\\omega = r\\omega_r`, :math:`A_0 = s a_0` and :math:`\\beta = r b/s`, each from the record.
 
-    The spring constant is :math:`k = (\\omega^2 + \\overline{\\lambda^2}) m_s/x^2` with :math:`x \\tan x = m_s/(m +
-    m_a)`, the quality factor :math:`Q = \\omega_0/2\\lambda` with :math:`\\lambda = -\\dot A/A` at the start. It is
-    exact for linear drag; for other laws it is :math:`2\\pi` times the energy over the loss in a period, to first order
-    in the damping. The drag coefficient is :math:`C = 3\\pi m \\beta/(2 \\omega \\rho S)` (K. Lelas, R. Pezer,
-    arXiv:2502.07458).
-
-    If an acceleration of amplitude a is recorded, the amplitude of the displacement is :math:`a/(\\omega^2 +
-    \\lambda^2)`; for a velocity it is :math:`v/\\sqrt{\\omega^2 + \\lambda^2}`, and that of an angle follows from its
-    rate alike. For angles, voltages, forces and numbers, results that need a length are left out. The spring constant
-    needs none.
+    The quality factor is exact for linear drag; for other laws it is :math:`2\\pi` times the energy over the loss in a
+    period, to first order in the damping. The drag coefficient is that of K. Lelas, R. Pezer, arXiv:2502.07458.
 
     Results that depend on the damping law are averages over laws (:func:`pipeline.damping.average.average_over_laws`):
     :math:`x = \\sum_i w_i x_i` and :math:`u^2 = \\sum_i w_i (u_i^2 + (x_i - x)^2)`.
     """
-    inputs = Inputs()
+    inputs, unit = Inputs(), track.unit
+    if not isinstance(motion, Fitted):
+        return _closed(track, motion, scene, inputs)
+    fitted = motion
     laws = _Laws(fitted.damping, inputs, fitted.windows)
-    unit = track.unit
-    of_scene = _of_scene(track, scene, effects, inputs)
+    of_scene = _of_scene(track, scene, {effect.name for effect in effects if effect.included}, inputs)
     every = solve(of_scene | _of_motion(track, fitted, misfits, laws, inputs))
     coefficients = every["coefficients"]
     found = {name: (x, _unit_of(name, unit)) for name, x in every.items() if name in QUANTITIES}
@@ -161,6 +161,39 @@ def derive(
         law_of_coefficients=laws.shown.name,
         quoted=laws.quoted,
         scales=(every["rates"], every["lengths"]),
+        **parts,
+    )
+
+
+def _closed(track: Track, motion: Relaxation | TwoModes | Rest, scene: Scene, inputs: Inputs) -> Derived:
+    """Return the results of a motion without laws, with the clock, scale and zero of the instrument."""
+    instrument, unit = Instrument.of(track), track.unit
+    of_scene = _of_scene(track, scene, {"added_mass", "spring_mass"}, inputs)
+    rate, scale = inputs.add("clock_rate", instrument.clock_rate, "B"), of_scene["distance_scale"]
+    x = dict(zip(motion.joint.names, inputs.add_joint("fitted_motion", motion.joint, "A", motion.dof), strict=True))
+    known = {
+        "time_factor": rate,
+        "rest_position": x["rest"],
+        "sensor_zero": inputs.add("sensor_zero", Estimate(0.0, instrument.u_offset_m, unit), "B"),
+        "offset_misfit": 0.0,
+        "noise_of_samples": inputs.add("noise", motion.noise, "A", motion.dof),
+    }
+    of_motion, results = closed_form(motion, x, rate=rate, scale=scale)
+    every = solve(of_scene | known | of_motion)
+    found = {name: value for name, value in every.items() if name in QUANTITIES} | results
+    budgets = {name: inputs.budget(name, value, _unit_of(name, unit)) for name, value in found.items()}
+    parts = {
+        name: Estimate.of_variable(every[name], _unit_of(name, unit)) if name in every else None for name in _PARTS
+    }
+    return Derived(
+        estimates={name: budget.estimate for name, budget in budgets.items()},
+        coefficients={},
+        budgets=budgets,
+        laws=(),
+        law="",
+        law_of_coefficients="",
+        quoted=False,
+        scales=(rate, scale),
         **parts,
     )
 
@@ -234,9 +267,8 @@ def _of_motion(
     }
 
 
-def _of_scene(track: Track, scene: Scene, effects: tuple[Effect, ...], inputs: Inputs) -> dict[str, Any]:
+def _of_scene(track: Track, scene: Scene, included: set[str], inputs: Inputs) -> dict[str, Any]:
     """Return the inputs of the formulas that the scene gives; None for what it does not state."""
-    included = {effect.name for effect in effects if effect.included}
     air = Ambient(scene, inputs, u_temperature_k=U_AIR_TEMPERATURE_K)
 
     def stated(name: str, value: Estimate | None) -> Any:
@@ -350,6 +382,13 @@ class _Laws:
             joint = Joint(("amplitude", "damping_rate", "displacement"), np.zeros(3), covariance, ("m", "1/s", "m"))
             quantities = quantities + np.array(inputs.add_joint("choice_of_law", joint, "A"))
         self.start, self.rate_at_start, self.root_mean_square = quantities.tolist()
+        if damping.by_statement or damping.admissible:
+            return
+        expected = self.stated.amplitude(elapsed)
+        local = local_decay(elapsed, windows.amplitude, expected, damping.scatter, best.joint.units[0])
+        if local is not None:
+            self.values = np.array([*local.values, self.values[2]])
+            self.start, self.rate_at_start = inputs.add_joint("local_decay", local, "A")
 
     def coefficients(self, rate: Any, scale: Any, lam: Any, start: Any) -> dict[str, tuple[Any, str]]:
         """Return the coefficients of the law of the results, in true seconds and metres.

@@ -20,7 +20,7 @@ from pipeline.results.budget import function_of
 class ResultFormula:
     """A result as a function of others, with its definition in words and conditions: inputs that must be there too."""
 
-    def __init__(self, function: Callable[..., Any], definition: str, *conditions: str) -> None:
+    def __init__(self, function: Callable[..., Any], definition: str = "", *conditions: str) -> None:
         self.function, self.definition = function, definition
         parameters = inspect.signature(function).parameters.values()
         self.parameters = tuple(each.name for each in parameters)
@@ -50,24 +50,19 @@ def solve(inputs: Mapping[str, Any]) -> dict[str, Any]:
 
 FORMULAS: Mapping[str, ResultFormula] = {
     "period": ResultFormula(
-        lambda angular_frequency: 2 * math.pi / angular_frequency,
-        "T = 2π/ω, of the damped motion",
+        lambda angular_frequency: 2 * math.pi / angular_frequency, "T = 2π/ω, of the damped motion"
     ),
     "period_small_swings": ResultFormula(
         lambda small_frequency: 2 * math.pi / small_frequency,
         "T_s = 2π/ω_s, of very small swings, where the frequency depends on the amplitude",
     ),
-    "frequency": ResultFormula(
-        lambda angular_frequency: angular_frequency / (2 * math.pi),
-        "f = ω/2π",
-    ),
+    "frequency": ResultFormula(lambda angular_frequency: angular_frequency / (2 * math.pi), "f = ω/2π"),
     "angular_frequency": ResultFormula(
         lambda phase_slope, time_factor: phase_slope * time_factor,
         "ω: slope of a straight line through the phases of the windows, the mean over the run",
     ),
     "amplitude": ResultFormula(
-        lambda law_start, lengths, crest: law_start * lengths * crest,
-        "A₀ = A(0), at the start",
+        lambda law_start, lengths, crest: law_start * lengths * crest, "A₀ = A(0), at the start"
     ),
     "offset": ResultFormula(
         lambda rest_position, distance_scale, sensor_zero, offset_misfit: (
@@ -122,9 +117,7 @@ FORMULAS: Mapping[str, ResultFormula] = {
         "of_spring",
     ),
     "keulegan_carpenter_number": ResultFormula(
-        lambda swing, disc_diameter: 2 * math.pi * swing / disc_diameter,
-        "KC = 2π A₀/D",
-        "displacement",
+        lambda swing, disc_diameter: 2 * math.pi * swing / disc_diameter, "KC = 2π A₀/D", "displacement"
     ),
     "reynolds_number": ResultFormula(
         lambda reynolds_per_speed, velocity_rms: reynolds_per_speed * velocity_rms,
@@ -146,25 +139,17 @@ FORMULAS: Mapping[str, ResultFormula] = {
         lambda angular_frequency, time_factor, squared_rate: angular_frequency**2 + squared_rate * time_factor**2,
         "Square of the angular frequency of the undamped motion: ω² and the mean squared rate ρ²",
     ),
-    "small_frequency": ResultFormula(
-        lambda small_swings, time_factor: small_swings * time_factor,
-        "Angular frequency of very small swings",
-    ),
+    "small_frequency": ResultFormula(lambda small_swings, time_factor: small_swings * time_factor),
     "filtered": ResultFormula(
         lambda angular_frequency, sensor_filter: sensor_filter(angular_frequency),
         "Gain of the sensor's filter, and the delay of an oscillation by it, rad",
     ),
     "lengths": ResultFormula(
-        lambda distance_scale, amplitude_factor, filtered: distance_scale * amplitude_factor / filtered[0],
-        "Factor from the amplitudes of the record to true ones",
+        lambda distance_scale, amplitude_factor, filtered: distance_scale * amplitude_factor / filtered[0]
     ),
-    "rates": ResultFormula(
-        lambda time_factor, rate_factor: time_factor * rate_factor,
-        "Factor from the damping rates of the record to true ones",
-    ),
+    "rates": ResultFormula(lambda time_factor, rate_factor: time_factor * rate_factor),
     "coefficients": ResultFormula(
-        lambda law, rates, lengths, damping_rate, amplitude: law(rates, lengths, damping_rate, amplitude),
-        "Coefficients of the law of the results by name, with their units",
+        lambda law, rates, lengths, damping_rate, amplitude: law(rates, lengths, damping_rate, amplitude)
     ),
     "motion_per_value": ResultFormula(
         lambda squared_natural_frequency, order: squared_natural_frequency ** (-0.5 * order) if order else 1.0,
@@ -191,24 +176,15 @@ FORMULAS: Mapping[str, ResultFormula] = {
         "of_angle",
     ),
     "carried_air": ResultFormula(
-        lambda air, disc_diameter: ADDED_MASS_SHAPE / 8.0 * air.density * disc_diameter**3,
-        "Mass of the air that a disc carries along, kg",
-        "of_added_mass",
+        lambda air, disc_diameter: ADDED_MASS_SHAPE / 8.0 * air.density * disc_diameter**3, "", "of_added_mass"
     ),
-    "own_mass_kg": ResultFormula(
-        lambda bob_mass, carried_air=0.0: bob_mass + carried_air,
-        "Mass of the bob, with the air carried along if the effects include it",
-    ),
+    "own_mass_kg": ResultFormula(lambda bob_mass, carried_air=0.0: bob_mass + carried_air),
     "effective_mass_kg": ResultFormula(
         lambda own_mass_kg, spring_mass=None, unstated_spring_mass=0.0: (
-            own_mass_kg
-            + (
-                unstated_spring_mass / 3.0
-                if spring_mass is None
-                else function_of(oscillating_mass_kg, spring_mass, own_mass_kg) - own_mass_kg
-            )
-        ),
-        "Mass that oscillates, with the share of the spring",
+            own_mass_kg + unstated_spring_mass / 3.0
+            if spring_mass is None
+            else function_of(oscillating_mass_kg, spring_mass, own_mass_kg)
+        )
     ),
     "half_stiffness": ResultFormula(
         lambda angular_frequency, distance_scale, filtered, displacement, effective_mass_kg=1.0: (
@@ -217,15 +193,12 @@ FORMULAS: Mapping[str, ResultFormula] = {
         "Mechanical energy over the squared recorded amplitude; per kilogram if no mass is known",
     ),
     "reynolds_per_speed": ResultFormula(
-        lambda known_air, disc_diameter: known_air.density * disc_diameter / known_air.viscosity(),
-        "Reynolds number over the speed: ρ D/η",
-        "displacement",
+        lambda known_air, disc_diameter: known_air.density * disc_diameter / known_air.viscosity(), "", "displacement"
     ),
     "drag_per_beta": ResultFormula(
         lambda effective_mass_kg, angular_frequency, known_air, disc_diameter, displacement: (
             6.0 * effective_mass_kg / (angular_frequency * known_air.density * disc_diameter**2) / displacement
-        ),
-        "Drag coefficient over β",
+        )
     ),
     "drag_length": ResultFormula(
         lambda drag_per_beta, time_factor, distance_scale, filtered: (

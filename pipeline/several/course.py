@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -150,55 +150,57 @@ def judged(runs: Sequence[CourseRun]) -> tuple[tuple[Suspect, ...], tuple[Disagr
     run without which the others agree is suspect too. Then far runs of two benches are exchanged in pairs, next to good
     runs.
     """
-    found = {run.name: Suspect(run.name, run.implausible) for run in runs if run.implausible}
     plausible = [run for run in runs if not run.implausible]
-    found |= _far(plausible)
-    exchanged: set[str] = set()
-
-    def exchange(a: str, b: str, others: str) -> None:
-        exchanged.update((a, b))
-        message = (
-            f"with the masses (or the periods) of {a} and {b} exchanged, they come together with {others}: "
-            "check which record belongs to which bob"
-        )
-        found.update({name: Suspect(name, message) for name in (a, b)})
-
+    found = {run.name: Suspect(run.name, run.implausible) for run in runs if run.implausible} | _far(plausible)
+    on_spring = [run for run in plausible if run.on_spring is not None]
     benches: dict[tuple[str, str], list[CourseRun]] = {}
-    for run in plausible:
-        if run.on_spring is not None:
-            benches.setdefault((run.bench, run.spring), []).append(run)
-    disagreements = []
-    for (bench, spring), every in benches.items():
-        comparison, rest = _compared(every), [run for run in every if run.name not in found]
-        if comparison is not None and not comparison.agree and not comparison.exchanged:
-            comparison = _compared(rest)
-        if comparison is None or comparison.agree:
-            continue
-        if comparison.exchanged:
-            a, b = comparison.exchanged
-            exchange(a, b, "the runs of their bench" if len(every) > 2 else "each other")
-            continue
-        constants = [k.value for k in comparison.each]
-        low, high = min(constants), max(constants)
-        spread = high / low - 1.0
-        if spread > LITTLE and (odd := _odd_one(rest)) is not None:
-            others = f"without it, the other {len(rest) - 1} runs of its bench and spring agree"
-            found[odd.name] = Suspect(odd.name, f"{others}: look at its mass and its spring")
+    for run in on_spring:
+        benches.setdefault((run.bench, run.spring), []).append(run)
+    disagreements, exchanged = [], dict[str, Suspect]()
+    for every in benches.values():
+        verdict = _of_bench(every, [run for run in every if run.name not in found])
+        if isinstance(verdict, Disagreement):
+            disagreements.append(verdict)
         else:
-            message = (
-                f"the {len(constants)} runs of its bench and spring disagree by {100.0 * spread:.2g} %, "
-                f"{comparison.largest_deviation:.3g} standard uncertainties ({low:.5g} to {high:.5g} N/m): "
-                "check masses and spring"
-            )
-            disagreements.append(Disagreement(bench, spring, comparison.names, spread, message))
-    good = [run for run in plausible if run.on_spring is not None and run.name not in found]
-    far = [run for run in plausible if run.on_spring is not None and run.name in found.keys() - exchanged]
+            found |= verdict
+            exchanged |= verdict if len(verdict) == 2 else {}
+    found |= _between_benches(on_spring, found, exchanged)
+    return tuple(found[run.name] for run in runs if run.name in found), tuple(disagreements)
+
+
+def _of_bench(every: Sequence[CourseRun], rest: Sequence[CourseRun]) -> Disagreement | dict[str, Suspect]:
+    """Return how the runs of one spring at one bench disagree, or those that are exchanged or alone do not fit."""
+    comparison = _compared(every)
+    if comparison is not None and not comparison.agree and not comparison.exchanged:
+        comparison = _compared(rest)
+    if comparison is None or comparison.agree:
+        return {}
+    if comparison.exchanged:
+        a, b = comparison.exchanged
+        return _exchange(a, b, "the runs of their bench" if len(every) > 2 else "each other")
+    constants = [k.value for k in comparison.each]
+    low, high = min(constants), max(constants)
+    spread = high / low - 1.0
+    if spread > LITTLE and (odd := _odd_one(rest)) is not None:
+        others = f"without it, the other {len(rest) - 1} runs of its bench and spring agree"
+        return {odd.name: Suspect(odd.name, f"{others}: look at its mass and its spring")}
+    message = (
+        f"the {len(constants)} runs of its bench and spring disagree by {100.0 * spread:.2g} %, "
+        f"{comparison.largest_deviation:.3g} standard uncertainties ({low:.5g} to {high:.5g} N/m): "
+        "check masses and spring"
+    )
+    return Disagreement(every[0].bench, every[0].spring, comparison.names, spread, message)
+
+
+def _between_benches(
+    runs: Sequence[CourseRun], found: Mapping[str, Suspect], exchanged: Mapping[str, Suspect]
+) -> dict[str, Suspect]:
+    """Return the far runs of two benches that come together with good runs if they are exchanged."""
+    good, pairs = [run for run in runs if run.name not in found], dict[str, Suspect]()
+    far = [run for run in runs if run.name in found.keys() - exchanged.keys()]
     for one, two in itertools.combinations(far, 2):
-        if (
-            one.spring == two.spring
-            and not exchanged & {one.name, two.name}
-            and _alike_exchanged(one.on_spring, two.on_spring)
-        ):
+        alike = one.spring == two.spring and _alike_exchanged(one.on_spring, two.on_spring)
+        if alike and not {one.name, two.name} & pairs.keys():
             # Runs of the two benches come first.
             mates = sorted(
                 (run for run in good if run.spring == one.spring),
@@ -206,8 +208,16 @@ def judged(runs: Sequence[CourseRun]) -> tuple[tuple[Suspect, ...], tuple[Disagr
             )
             comparison = _compared([one, two, *mates[: FEWEST_FOR_MEDIAN + 1]])
             if comparison is not None and set(comparison.exchanged) == {one.name, two.name}:
-                exchange(one.name, two.name, "the others")
-    return tuple(found[run.name] for run in runs if run.name in found), tuple(disagreements)
+                pairs |= _exchange(one.name, two.name, "the others")
+    return pairs
+
+
+def _exchange(a: str, b: str, others: str) -> dict[str, Suspect]:
+    message = (
+        f"with the masses (or the periods) of {a} and {b} exchanged, they come together with {others}: "
+        "check which record belongs to which bob"
+    )
+    return {name: Suspect(name, message) for name in (a, b)}
 
 
 def _compared(runs: Sequence[CourseRun]) -> Comparison | None:

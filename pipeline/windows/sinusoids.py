@@ -17,8 +17,8 @@ from pipeline.track import F8
 # Minimum determinant of the normal matrix per sample: 1/4 for a full period, and 0.003 as measured for samples within
 # 0.29 of a period, where rest position and amplitude can hardly be distinguished.
 LEAST_DETERMINANT = 0.003
-# Minimum number of samples, twice that of the parameters. With eight, windows of long recordings get lost, as measured
-# by `python -m tests.golden --only trouble45`.
+# Minimum number of samples, twice that of the parameters. With three degrees of freedom the noise appears half as large
+# as it is with a probability of 14 % (chi-square).
 LEAST_SAMPLES = 6
 # Further degrees of the smooth curves, for a frequency that falls with the amplitude as that of a wide pendulum does.
 # One is taken if the mean squared residual falls below this factor of the lower degree's, which noise leaves at 1, and

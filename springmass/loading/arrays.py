@@ -125,8 +125,8 @@ def _columns(source: Any) -> tuple[_ArrayColumn, _ArrayColumn, Any]:
             return _ArrayColumn(t), _ArrayColumn(source["distance"]), flags
     elif hasattr(source, "columns"):
         return *_by_headings(source), None
-    elif getattr(source, "ndim", None) == 1 and "time" in getattr(source, "coords", ()):
-        return _ArrayColumn(source.coords["time"]), _ArrayColumn(source), None
+    elif getattr(source, "ndim", None) == 1 and (along := _along(source)) is not None:
+        return _ArrayColumn(along), _ArrayColumn(source), None
     elif getattr(source, "ndim", None) == 1 and hasattr(source, "index"):
         return _ArrayColumn(_index_of(source)), _ArrayColumn(source), None
     elif isinstance(source, list | tuple) and len(source) == 2:
@@ -136,6 +136,12 @@ def _columns(source: Any) -> tuple[_ArrayColumn, _ArrayColumn, Any]:
             f"its times were expected as a coordinate named time, got {coords}", "rename the one with times"
         )
     raise TrackError(f"{EXPECTED}, got {type(source).__name__}")
+
+
+def _along(source: Any) -> Any:
+    """Return the coordinate named time of a data array, or the only one along its dimension; else None."""
+    along = {str(name): each for name, each in getattr(source, "coords", {}).items() if each.dims == source.dims}
+    return along.get("time", next(iter(along.values())) if len(along) == 1 else None)
 
 
 def _by_headings(frame: Any) -> tuple[_ArrayColumn, _ArrayColumn]:

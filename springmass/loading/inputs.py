@@ -14,6 +14,7 @@ from acquisition.regular_file import open_regular
 from springmass.errors import UNREADABLE, ProgramError
 from springmass.typeset import count
 from storage.run_file.layout import HDF5_MAGIC
+from storage.run_file.reading import may_be_run
 from storage.wire_log.records import WIRE_MAGIC
 
 RUN_SUFFIXES = (".h5", ".hdf5", ".nxs")
@@ -121,7 +122,7 @@ def kind_of(path: str | os.PathLike[str]) -> Literal["run", "wire", "recording"]
     except (OSError, ValueError):
         return "recording"  # the format registry reports the problem
     if head == HDF5_MAGIC:
-        return "run"
+        return "run" if may_be_run(path) else "recording"
     return "wire" if head.startswith(WIRE_MAGIC) else "recording"
 
 

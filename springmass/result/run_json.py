@@ -133,7 +133,7 @@ def _correlations(motion: Oscillation) -> dict[str, Any]:
 
 def _damping(motion: Oscillation) -> dict[str, Any]:
     damping, derived = motion.damping, motion.derived
-    keys, coefficients = ("reduced_chi2", "dof", "bic", "rejected"), parameters_json(derived.coefficients)
+    keys, coefficients = ("reduced_chi2", "dof", "bic", "rejected", "rejection"), parameters_json(derived.coefficients)
     laws = {
         name: {"parameters": parameters_json(derived.parameters_of(fit)), **picked(fit, keys)}
         for name, fit in damping.fits.items()

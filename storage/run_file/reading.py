@@ -35,6 +35,17 @@ def open_run(path: str | os.PathLike[str], *, unverified: bool = False) -> RunFi
     return RunFile(path, unverified=unverified)
 
 
+def may_be_run(path: str | os.PathLike[str]) -> bool:
+    """Return whether an HDF5 file is a run file, perhaps a damaged one, and not one of another program."""
+    import h5py
+
+    try:
+        with h5py.File(path) as file:
+            return "entry" in file or not any(isinstance(item, h5py.Dataset) for item in file.values())
+    except (OSError, KeyError, RuntimeError):
+        return True
+
+
 class RunFile:
     """An open run file.
 

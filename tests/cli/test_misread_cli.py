@@ -253,10 +253,17 @@ def test_a_clock_that_was_set_forward_is_a_jump(read: Callable[..., Any], tmp_pa
     read(tmp_path / "run.csv", "--to", "9.9")
 
 
+def test_a_clock_that_was_set_back_by_an_hour_goes_on(read: Callable[..., Any]) -> None:
+    """The end of summer time: with an hour more, the step is as usual."""
+    result = read(jump(10.0, -3600.0))
+    assert result["input"]["samples"] == 3000
+    assert [each for each in result["findings"] if each["code"] == "times_mended"]
+
+
 def test_a_clock_that_was_set_back_makes_two_runs(cli: Cli, read: Callable[..., Any], tmp_path: Path) -> None:
-    """The end of summer time."""
+    """No wrap of a counter explains the step."""
     path = tmp_path / "run.csv"
-    path.write_text(jump(10.0, -3600.0))
+    path.write_text(jump(10.0, -1234.0))
     asked = cli("analyse", path, "--json")
     assert asked.code == 3
     assert "--run" in asked.complaint

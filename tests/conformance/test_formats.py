@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import tarfile
 import zipfile
 from collections.abc import Callable
@@ -11,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.io import wavfile
 
 from acquisition.recordings.identify import formats, get_format
 from springmass.testing import File, check
@@ -342,7 +344,43 @@ def trk(t: Any, x: Any) -> bytes:
     ).encode()
 
 
+def npz(t: Any, x: Any) -> bytes:
+    """Write two arrays of numpy."""
+    content = io.BytesIO()
+    np.savez(content, time_s=t, distance_m=x)
+    return content.getvalue()
+
+
+def json_columns(t: Any, x: Any) -> bytes:
+    """Write an object of two lists."""
+    return json.dumps({"time_s": [float(each) for each in t], "distance_m": [float(each) for each in x]}).encode()
+
+
+def wav(t: Any, x: Any) -> bytes:
+    """Write sound in double precision."""
+    content = io.BytesIO()
+    wavfile.write(content, round(RATE_HZ), np.asarray(x, np.float64))
+    return content.getvalue()
+
+
+def labchart(t: Any, x: Any) -> bytes:
+    """Write one block of LabChart."""
+    head = ["Interval=\t0.01 s", "ChannelTitle=\tDistance", "UnitName=\tm"]
+    return "\n".join([*head, *rows(t, x, "{t:.3f}\t{x:.5f}"), ""]).encode()
+
+
+def acqknowledge(t: Any, x: Any) -> bytes:
+    """Write text of AcqKnowledge with a column of times."""
+    head = ["run.acq", "10 msec/sample", "1 channels", "Distance", "m", "sec\tCH1", f"\t{len(t)}"]
+    return "\n".join([*head, *rows(t, x, "{t:.3f}\t{x:.5f}"), ""]).encode()
+
+
 CASES = [
+    Case("arrays", "npz", npz, None, text=False),
+    Case("json", "columns", json_columns, None, text=False),
+    Case("wav", "double", wav, None, text=False),
+    Case("labchart", "times", labchart),
+    Case("acqknowledge", "times", acqknowledge),
     Case("motion-sensor", "position", motion_position),
     Case("motion-sensor", "position-LF", lambda t, x: motion_position(t, x, "\n")),
     Case("motion-sensor", "position-no-header", lambda t, x: motion_position(t, x, header=0)),

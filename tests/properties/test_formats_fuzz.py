@@ -85,7 +85,7 @@ def check(name: str, data: bytes, options: dict[str, Any]) -> Recording | str:
     sound = (samples.flags & ~np.uint8(64)) == 0
     assert (np.diff(samples.t[sound]) > 0).all()
     values = samples.distance[sound] if recording.channel != "velocity" else np.empty(0)
-    if name in ("tdms", "phyphox", "workbook", "zip", "tracker") or not values.size:
+    if name in ("arrays", "wav", "tdms", "phyphox", "workbook", "zip", "tracker") or not values.size:
         return recording
     if name == "motion-sensor":
         demand_printed_pairs(recording, data, sound)

@@ -17,11 +17,15 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import zip_longest
+
+import numpy as np
 
 from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.tables.format import text_format
 from acquisition.recordings.tables.headings import Heading, headings_of, is_time, split_heading
 from acquisition.recordings.tables.layout import (
+    are_named_times,
     are_row_numbers,
     columns_of,
     find_table,
@@ -30,11 +34,12 @@ from acquisition.recordings.tables.layout import (
     times_by_steps,
     wrong_commas,
 )
-from acquisition.recordings.tables.numbers import parse_number
+from acquisition.recordings.tables.numbers import is_lost, parse_number
 from acquisition.recordings.tables.table import Header
 from acquisition.recordings.tables.text import Text, decode, in_turn
-from acquisition.recordings.tables.times import clock_s
-from acquisition.units import measure_of, time_unit
+from acquisition.recordings.tables.times import clock_s, clock_times, is_newest_first, is_time_cell
+from acquisition.recordings.tables.vocabulary import LABEL
+from acquisition.units import measure_of
 
 _MONITOR = re.compile(
     r"^\[?(?:\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ]+)?(\d{1,2}:\d\d:\d\d(?:[.,]\d{1,9})?)(?:[^\S\n]*->|\])[^\S\n]*",
@@ -42,7 +47,8 @@ _MONITOR = re.compile(
 )
 _MATRIX_ROW = re.compile(rb"^[-+.,\deE \t\[]*[;\]][ \t\];]*$", re.MULTILINE)
 _BLANKED = bytes.maketrans(b"[];", b"   ")
-_FEWEST, _SHARE, _HEAD = 3, 0.8, 40
+_QUANTITY = re.compile(r"([-+]?[\d.,]+(?:[eE][-+]?\d{1,2})?) ?([^\W\d_][^\s\d]*|°)")
+_FEWEST, _SHARE, _HEAD, _MOST_WORDS, _FEWEST_LONG, _MOST_LONG = 3, 0.8, 40, 20, 20, 5
 
 
 def header(lines: Sequence[str]) -> Header | None:
@@ -56,19 +62,25 @@ def header(lines: Sequence[str]) -> Header | None:
         return None
     # The last row may be incomplete.
     columns = columns_of(table.rows[:-1] if len(table.rows) > _FEWEST else table.rows)
-    headings, words = _units_beside(table)
-    times, formula, traps = times_by_name(headings, columns), table.formula, list(table.traps)
-    clocks = [at for at, cell in enumerate(table.rows[0]) if clock_s(cell) and parse_number(cell) is None]
-    clock = None
+    headings, words = list(table.headings), _words(table)
+    for at in words:  # rows of several sensors may have the same times
+        of_one = [row for row in table.rows if row[at] == table.rows[0][at]]
+        columns = columns_of(of_one) if len(of_one) >= _FEWEST else columns
+    times, formula, traps = times_by_name(table, columns), table.formula, list(table.traps)
+    clocks = [at for at, cells in enumerate(zip(*table.rows, strict=True)) if _are_clocks(cells)]
+    unread = "" if times or formula is not None else _unread_times(table, clocks)
     if not times and formula is None and clocks:
-        clock = clocks[0]
-        headings[clock] = replace(headings[clock], unit="s")
-        times = [clock]
-        traps.append(FormatIssue("clock_times", f"the file gives times of day; here time 0 is {table.rows[0][clock]}"))
+        # Of several clocks one may be the same in all rows.
+        clock = max(clocks, key=lambda at: (len({row[at] for row in table.rows}) > 1, is_time(headings[at].name), -at))
+        for at in clocks:
+            headings[at] = replace(headings[at], unit="s")
+        times, unread, first = [clock], "", table.rows[0][clock]
+        if clock_s(first) and not is_newest_first(clock_times([row[clock].encode() for row in table.rows])[0]):
+            traps.append(FormatIssue("clock_times", f"the file gives times of day; here time 0 is {first}"))
     bare = not table.named and table.lines == 0 and all(parse_number(cell) is not None for cell in table.rows[0])
     # A single column besides row numbers contains measured values, even if it rises.
     numbered = bare and len(columns) > 1 and are_row_numbers(columns[0])
-    if not times and formula is None and not (bare and len(columns) <= 1 + numbered):
+    if not times and formula is None and not unread and not (bare and len(columns) <= 1 + numbered):
         guess = times_by_steps(headings, columns)
         if guess is not None:
             times = [guess]
@@ -95,9 +107,27 @@ def header(lines: Sequence[str]) -> Header | None:
         headings=[marked(at, each) for at, each in enumerate(headings)],
         ragged=len(values) > 1,
         traps=tuple(traps),
-        clock=clock,
+        clocks=tuple(clocks) if not formula and set(times) <= set(clocks) else (),
+        words=tuple(words),
+        unread_times=unread,
         refused=(problem, remedy) if wrong_commas(table) else None,
     )
+
+
+def _are_clocks(cells: Sequence[str]) -> bool:
+    """Return whether the cells of a column are times of day or durations, and no numbers."""
+    filled = [cell for cell in cells if cell and not is_lost(cell)]
+    return bool(filled) and all(parse_number(cell) is None and is_time_cell(cell) for cell in filled[:_FEWEST])
+
+
+def _unread_times(table: Header, clocks: Sequence[int]) -> str:
+    """Return what is wrong with a column that is named as times and is none; empty if there is no such column."""
+    for at, each in enumerate(table.headings):
+        if at not in clocks and are_named_times(each):
+            cells = [row[at] for row in table.rows if row[at]]
+            if cells and parse_number(cells[0]) is None:
+                return f'the times in column "{each.name}" cannot be read, the first is "{cells[0][:40]}"'
+    return ""
 
 
 def _headed(lines: Sequence[str]) -> Header | None:
@@ -113,15 +143,17 @@ def _headed(lines: Sequence[str]) -> Header | None:
     return Header(why, 1, mark, headings)
 
 
-def _units_beside(table: Header) -> tuple[list[Heading], set[int]]:
-    """Return the headings, with units taken from columns of units to the right of the numbers, and these columns."""
-    headings, words = list(table.headings), set()
-    for column, cells in enumerate(zip(*table.rows, strict=True)):
-        is_unit = measure_of(cells[0]) is not None or time_unit(cells[0]) is not None
-        if column and is_unit and parse_number(cells[0]) is None and len(set(cells)) == 1 and not headings[column].name:
-            headings[column - 1] = replace(headings[column - 1], unit=headings[column - 1].unit or cells[0])
-            words.add(column)
-    return headings, words
+def _words(table: Header) -> list[int]:
+    """Return the columns of words that may be units, or the names of sensors: a few words, each of them often."""
+    words = []
+    for at, cells in enumerate(zip(*table.rows, strict=True)):
+        filled = {cell for cell in cells if cell}
+        name = re.findall(r"[^\W\d_]+", table.headings[at].name.lower())
+        labels = name and LABEL.issuperset(name) and all(cell.isdecimal() for cell in filled)
+        plain = all(parse_number(cell) is None and not is_time_cell(cell) for cell in filled)
+        if filled and (plain or labels) and len(filled) <= min(_MOST_WORDS, len(cells) // 2):
+            words.append(at)
+    return words
 
 
 def without_monitor(text: Text) -> Text:
@@ -144,7 +176,7 @@ def prepared(text: Text) -> Text:
     A sketch may print the time on one line and the values on the next. The line numbers stay as they are. The brackets
     and semicolons of a matrix of MATLAB become blanks.
     """
-    text = without_monitor(text)
+    text = _with_units_apart(_as_columns(without_monitor(text)))
     head = text.head(_HEAD)
     if 2 * sum(line.rstrip().endswith(";") for line in head) > len(head):
         text = Text.of(_MATRIX_ROW.sub(lambda row: row[0].translate(_BLANKED), text.data))
@@ -162,6 +194,48 @@ def prepared(text: Text) -> Text:
         joined += [mark.join(line.strip() for line in pair), ""] if whole else pair[:1]
         at += 2 if whole else 1
     return Text.of("\n".join([*joined, ""] if text.ended else joined).encode())
+
+
+def _as_columns(text: Text) -> Text:
+    """Return a text of a few long lines, each a quantity, as columns; any other text as it is."""
+    lines = [line for line in text.lines(0, 3 * _MOST_LONG) if line.strip()]
+    if not 0 < len(lines) <= _MOST_LONG or len(text) > 3 * _MOST_LONG:
+        return text
+    plain = [re.sub(r"^\s*\w+\s*=", "", line).strip(" []{};\t") for line in lines]
+    mark = next((mark for mark in "\t;," if mark in plain[0]), None)
+    rows = [split_heading(line.strip(f"{mark} "), mark)[0] if mark else line.split() for line in plain]
+    full = rows[:-1] or rows  # the last line of a head is cut
+    numbers = [cell for row in full for cell in row[1:]]
+    if min(map(len, full)) < _FEWEST_LONG or any(
+        parse_number(cell) is None and not is_time_cell(cell) for cell in numbers
+    ):
+        return text
+    return Text.of("\n".join(["\t".join(cells) for cells in zip_longest(*rows, fillvalue="")] + [""]).encode())
+
+
+def _with_units_apart(text: Text) -> Text:
+    """Return a text in which the units that cells have behind their numbers are cells of their own."""
+    head = [line for line in text.head(_HEAD) if any(char.isdigit() for char in line)]
+    mark = next((mark for mark in "\t;," if all(mark in line for line in head[1:])), None)
+    if mark is None or len(head) < 2 * _FEWEST:
+        return text
+    with_unit = [[_is_quantity(cell) for cell in line.split(mark)] for line in head[_FEWEST:]]
+    apart = {at for at, kinds in enumerate(zip_longest(*with_unit, fillvalue=False)) if np.mean(kinds) >= _SHARE}
+    if not apart or len(apart) == len(with_unit[0]):  # a sketch prints one distance in several units
+        return text
+    lines = []
+    for line in text.lines():
+        cells = line.split(mark)
+        for at in sorted(apart & {*range(len(cells))}, reverse=True):
+            match = _QUANTITY.fullmatch(cells[at].strip(' "'))
+            cells[at : at + 1] = [match[1], match[2]] if match else [cells[at], ""]
+        lines.append(mark.join(cells))
+    return Text.of("\n".join(lines).encode())
+
+
+def _is_quantity(cell: str) -> bool:
+    match = _QUANTITY.fullmatch(cell.strip(' "'))
+    return match is not None and parse_number(match[1]) is not None and measure_of(match[2]) is not None
 
 
 def _width(line: str, mark: str) -> int:

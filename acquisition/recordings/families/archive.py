@@ -108,7 +108,12 @@ def _is_wanted(file: zipfile.ZipInfo) -> bool:
 
 
 def _evidence(head: bytes) -> str:
-    others = b"[Content_Types].xml" in head or b"xl/" in head or b"application/vnd.oasis" in head[:200]
+    others = (
+        b"[Content_Types].xml" in head
+        or b"xl/" in head
+        or b".npy" in head[30:128]
+        or b"application/vnd.oasis" in head[:200]
+    )
     return "it begins with the bytes of a zip archive" if head.startswith(_MAGIC) and not others else ""
 
 

@@ -14,13 +14,14 @@ import numpy as np
 
 from acquisition.errors import FormatError
 from acquisition.line_numbers import UNIT_OF_WORD, Number, find_distance, has_decimal_comma, numbers
+from acquisition.recordings.families.markup import BLANKS
 from acquisition.recordings.tables.format import ColumnFormat
 from acquisition.recordings.tables.headings import Heading, is_time
 from acquisition.recordings.tables.layout import runs_forward
 from acquisition.recordings.tables.numbers import UNREAD_CELL
 from acquisition.recordings.tables.table import Column, Lines, Table, side_by_side
 from acquisition.recordings.tables.text import Text, in_turn, is_text, text_of
-from acquisition.recordings.tables.times import CLOCK, clock_times, count_from_first
+from acquisition.recordings.tables.times import CLOCK, clock_times
 
 _FEWEST, _SHARE, _MOST, _HEAD = 3, 0.6, 40, 120
 _BRACKETS = re.compile(r"\s*[(\[]")  # as Python prints tuples and lists
@@ -58,7 +59,8 @@ def _kind(of_line: list[Number]) -> LineForm:
 
 
 def _evidence(head: bytes) -> str:
-    lines = _joined(Text.of(head).head(_HEAD)) if is_text(head) else []
+    markup = head.lstrip(BLANKS).startswith(b"<")
+    lines = _joined(Text.of(head).head(_HEAD)) if is_text(head) and not markup else []
     return "the lines are words with numbers, as a sketch prints them" if _usual(lines) else ""
 
 
@@ -89,8 +91,7 @@ def _tables(path: str, data: bytes) -> list[Table]:
         columns.append(Column("", "", values, np.array(forms, np.int8)))
     stamps = [match[0].strip(" [").encode() if (match := _CLOCK.match(line)) else b"" for line, _ in rows]
     if all(stamp or not of_line for stamp, (_, of_line) in zip(stamps, rows, strict=True)):
-        columns.insert(0, Column("", "", *clock_times(stamps)[:2]))
-        count_from_first(columns[0])
+        columns.insert(0, Column("", "", *clock_times(stamps)))
         headings.insert(0, Heading("Time", "s", role="time"))
     numbered = np.array([number for number, _, _ in lines[first:stop]])
     where = Lines(numbered, np.zeros(len(rows), bool), zeros=text.zeros)

@@ -9,12 +9,13 @@ memory.
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 
 from acquisition.errors import FormatError
 from acquisition.recordings.families import workbook_child
-from acquisition.recordings.families.archive import NOT_INSIDE, tables_inside
+from acquisition.recordings.families.archive import NOT_INSIDE, members, tables_inside
 from acquisition.recordings.identify import foreign_format
 from acquisition.recordings.tables.format import ColumnFormat
 from acquisition.recordings.tables.table import Table
@@ -30,6 +31,8 @@ TIME_LIMIT_S = 60.0
 
 _ZIP = b"PK\x03\x04"
 _OLE = bytes.fromhex("d0cf11e0a1b11ae1")
+_NO_VALUE = re.compile(rb"</f>\s*(?:<v\s*/>|<v>\s*</v>|</c>)")
+_FEWEST_FORMULAS = 10
 _REMEDY = "export the sheet as CSV"
 
 
@@ -43,7 +46,18 @@ def _evidence(head: bytes) -> str:
 def _tables(path: str, data: bytes) -> list[Table]:
     if len(data) > MOST_WORKBOOK_BYTES:
         raise FormatError(path, f"expected a workbook of at most {MOST_WORKBOOK_BYTES} bytes, got {len(data)}", _REMEDY)
+    _refuse_formulas(path, data)
     return tables_inside(path, _sheets(path, data), "sheet", (*NOT_INSIDE, "sketch"))
+
+
+def _refuse_formulas(path: str, data: bytes) -> None:
+    """Refuse a workbook whose formulas have no values, because no spreadsheet has opened it yet."""
+    if not data.startswith(_ZIP):
+        return
+    for name, part in members(path, data):
+        if name.startswith("xl/worksheets/") and (count := len(_NO_VALUE.findall(part))) >= _FEWEST_FORMULAS:
+            problem = f"expected numbers, got {count} formulas without values in {name.rpartition('/')[2]}"
+            raise FormatError(path, problem, "open it in a spreadsheet and save it")
 
 
 def _sheets(path: str, data: bytes) -> list[tuple[str, bytes]]:

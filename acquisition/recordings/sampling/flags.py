@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -159,6 +159,26 @@ def length_traps(distance: F8, flags: U8, resolution: float, lines: I8 | None) -
         message = f"distances are multiples of {quantum * 1e3:g} mm: smaller motion is lost by rounding"
         traps.append(FormatIssue("quantised", message, distance.size))
     return quantum, tuple(traps)
+
+
+def unwrapped(values: F8, turns: Iterable[float]) -> tuple[F8, int]:
+    """Return values whose jumps by one of some turns are undone, and the number of these jumps.
+
+    Each jump is a turn but for a usual step, and all other steps are less than a quarter of it.
+    """
+    finite = np.flatnonzero(np.isfinite(values))
+    steps = np.diff(values[finite])
+    for turn in turns:
+        jumps = np.abs(steps) > 0.5 * turn
+        if not jumps.any() or np.ptp(values[finite]) > turn * (1 + 1e-9):
+            continue
+        usual = float(np.abs(steps[~jumps]).max(initial=0.0))
+        if usual < 0.25 * turn and np.abs(np.abs(steps[jumps]) - turn).max() <= 1.5 * usual:
+            whole = values.copy()
+            whole[finite] -= turn * np.concatenate(([0.0], np.cumsum(np.sign(steps) * jumps)))
+            if np.ptp(whole[finite]) < np.ptp(values[finite]):  # else it turns on and on
+                return whole - turn * round(median(whole[finite]) / turn), int(np.count_nonzero(jumps))
+    return values, 0
 
 
 def _zero_tail(distance: F8) -> int:

@@ -20,6 +20,7 @@ from acquisition.recordings.sampling.flags import (
     row_traps,
     sample_traps,
     time_flags,
+    unwrapped,
 )
 from acquisition.recordings.sampling.timing import ChannelRows, find_timing
 from acquisition.recordings.tables.choose import choose_channel, measure
@@ -30,6 +31,7 @@ from acquisition.units import TIMES, Measure, time_unit
 
 _LONGEST_S = 1e10
 """Times beyond three hundred years are no times."""
+_FEWEST_PEAKS, _MOST_PEAKS, _SHARE_OF_PEAKS = 12, 300, 0.97
 _HOUR_S, _DAY_S, _MOST_JUMPS, _SLOWEST_HZ = 3600.0, 86400.0, 10, 0.01
 
 
@@ -40,8 +42,31 @@ def read_channel(path: str, tables: Sequence[Table], answers: ReadOptions) -> Sa
     table, column = choose_channel(path, names_apart(tables), answers)
     measured, traps = measure(path, column, answers.unit)
     rows = rows_of(path, table, column, measured)
+    rows, jumps = _without_jumps(rows, column, measured)
     samples = read_samples(path, rows, table, column, measured, rate_hz)
-    return replace(samples, traps=(*table.traps, *traps, *samples.traps))
+    _refuse_peaks(path, samples.value)
+    return replace(samples, traps=(*table.traps, *traps, *jumps, *samples.traps))
+
+
+def _without_jumps(rows: ChannelRows, column: Column, measured: Measure) -> tuple[ChannelRows, tuple[FormatIssue, ...]]:
+    """Undo jumps of an angle by one turn, and of whole numbers by a power of two."""
+    scale = 10.0**measured.power * measured.factor
+    printed = rows.value / scale
+    whole = not np.nanmax(np.abs(printed - np.rint(printed)), initial=0.0)
+    turns = [2 * math.pi] if measured.quantity == "angle" else [2.0**bits * scale for bits in (16, 32) if whole]
+    value, count = unwrapped(rows.value, turns)
+    if not count:
+        return rows, ()
+    message = f'{count} jumps of "{column.name}" by a full turn of its numbers were undone'
+    return replace(rows, value=value), (FormatIssue("values_unwrapped", message, count),)
+
+
+def _refuse_peaks(path: str, values: F8) -> None:
+    """Refuse a table of turning points: every value is above or below both of its neighbours."""
+    steps = np.diff(values[np.isfinite(values)])
+    if _FEWEST_PEAKS <= steps.size <= _MOST_PEAKS and np.mean(steps[1:] * steps[:-1] < 0.0) >= _SHARE_OF_PEAKS:
+        problem = f"expected samples of a motion, got {steps.size + 1} turning points, above and below in turn"
+        raise FormatError(path, problem, "export all samples; the motion between the turning points is needed")
 
 
 def read_samples(

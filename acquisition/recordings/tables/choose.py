@@ -14,9 +14,17 @@ from acquisition.recordings.questions import Missing, MissingItem, Question
 from acquisition.recordings.reading import READ_DEFAULTS, ReadOptions
 from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.sampling.timing import median, rate_needed
+from acquisition.recordings.tables.blocks import runs_of
 from acquisition.recordings.tables.headings import BRACKETED, name_and_unit
 from acquisition.recordings.tables.table import Column, Table
-from acquisition.recordings.tables.vocabulary import DERIVED, OSCILLATES, POSITION_WORDS, UNIT_OF_NAME
+from acquisition.recordings.tables.vocabulary import (
+    AUTOCORRELATION,
+    DERIVED,
+    FREQUENCY,
+    OSCILLATES,
+    POSITION_WORDS,
+    UNIT_OF_NAME,
+)
 from acquisition.units import MEASURES, TIMES, Measure, measure_of, time_unit, unit_words
 
 _SLOW_S = 0.999
@@ -28,6 +36,7 @@ _FIRST_ROWS = 50
 _SOME = 20_000
 _FEWEST_ROWS, _FEWEST_TURNS, _MOST_NAMES = 20, 4, 4
 _SHARE_OF_RESTARTS = 0.2
+_READ_TIMES = "write them in seconds or like 2025-04-17 17:00:08.010; or state the rate, if you know it"
 _EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
 """Units of times since 1970, each with the minimum of the numbers to which it applies."""
 Channel = tuple[Table, Column]
@@ -42,10 +51,10 @@ def choose_channel(path: str, tables: Sequence[Table], answers: ReadOptions) -> 
     sizes = {run: max(_rows(table) for table in tables if table.run == run) for run in runs}
     run = max(runs, key=lambda each: sizes[each])  # the first of the longest
     if answers.run is not None:
-        if runs == ("",) and answers.run:
+        if runs == ("",) and answers.run and answers.time is None:
             problem = f'the file has one run without a name, got run "{answers.run}"'
             raise FormatError(path, problem, "leave run out")
-        run = runs[_index_of_name(path, Missing.RUN, [(each,) for each in runs], answers.run)]
+        run = runs[_index_of_name(path, Missing.RUN, [(each,) for each in runs], answers.run) if runs != ("",) else 0]
     elif len(runs) > 1:
         needs.append(MissingItem(Missing.RUN, runs, run))
     channels = [(table, column) for table in tables if table.run == run for column in table.columns]
@@ -58,12 +67,15 @@ def choose_channel(path: str, tables: Sequence[Table], answers: ReadOptions) -> 
         if len(fit) > 1:
             needs.append(MissingItem(Missing.CHANNEL, tuple(each.name for _, each in fit), column.name))
     if answers.time is not None:
-        table = _timed_by(path, table, column, answers.time)
+        table = _run_of(path, runs_of(_timed_by(path, table, column, answers.time)), answers.run)
+        column = next((each for each in table.columns if each.name == column.name), column)
     if table.times is not None and table.lines is not None and _restarts(table.times):
         table = replace(table, times=None, formula=None)  # chunks of times, with unknown intervals between them
+    if no_motion := _no_motion(table, column):
+        raise FormatError(path, f"expected a motion, got {no_motion}", "export the data against time")
     if answers.time_unit is not None:
         table = _with_time_unit(path, table, answers.time_unit)
-    needs.extend(_missing_times([each for _, each in channels], table, column, answers))
+    needs.extend(_missing_times(path, [each for _, each in channels], table, column, answers))
     if column.measure is None and answers.unit is None:
         needs.append(_unit_needed(column))
     if needs:
@@ -81,9 +93,12 @@ def measure(path: str, column: Column, unit: str | None) -> tuple[Measure, tuple
         raise FormatError(path, f'unit must be one of {", ".join(MEASURES)}, got "{unit}"', "name one of these")
     if of_file == given:
         return given, ()
-    if of_file is not None and (of_file.quantity in ("length", given.quantity)):
-        problem = f'unit must be {unit_words(column.unit)} as stated by "{column.label}", got "{unit}"'
-        raise FormatError(path, problem, "leave the unit out")
+    if of_file is not None and column.words is not None:
+        problem = f'each row of "{column.name}" states its unit, got "{unit}"'
+        raise FormatError(path, problem, f"leave the unit out, or state {of_file.symbol}")
+    if of_file is not None and of_file.quantity == given.quantity:
+        message = f'you stated the unit {unit} for "{column.label}": the unit of the file is not used'
+        return given, (FormatIssue("unit_given", message),)
     if not column.unit:
         return given, (FormatIssue("unit_given", f'you stated the unit of "{column.name}": {unit}'),)
     holds = "times, frequencies and damping rates are not affected"
@@ -104,6 +119,18 @@ def _candidates(channels: Sequence[Channel]) -> Sequence[Channel]:
     fit = [each for each in fit if _varies(_some_of(each[1]))] or fit
     fit = [each for each in fit if each[1].is_length] or fit
     return sorted(fit, key=lambda each: _unlikely(each[1]))
+
+
+def _no_motion(table: Table, column: Column) -> str:
+    """Return what is tabulated if it is no motion: a spectrum or an autocorrelation; empty for a motion."""
+    names = [column.name, table.times.name if table.times is not None else ""]
+    if any(AUTOCORRELATION.search(name) for name in names):
+        return f'the autocorrelation "{" against ".join(filter(None, names))}"'
+    for each in table.beside if not table.is_timed else ():
+        rises = np.diff(_some_of(each))
+        if (FREQUENCY.search(each.name) or each.unit.lower() in ("hz", "khz")) and rises.size and (rises > 0).all():
+            return f'a spectrum against "{each.label}"'
+    return ""
 
 
 def _may_be_a_recording(table: Table) -> bool:
@@ -200,8 +227,20 @@ def _timed_by(path: str, table: Table, column: Column, time: str) -> Table:
         raise FormatError(path, f'"{time}" cannot be both channel and time', "name another column for one of them")
     if table.lines is None and times.values.size != column.values.size:
         raise FormatError(path, f'"{time}" and "{column.name}" differ in length', "name another column of times")
+    if not np.isfinite(times.values).any():
+        raise FormatError(path, f'the times in column "{times.name}" cannot be read', _READ_TIMES)
     unit = times.unit if time_unit(times.unit) is not None else ""
     return replace(table, times=replace(times, unit=unit), formula=None)
+
+
+def _run_of(path: str, parts: Sequence[Table], run: str | None) -> Table:
+    """Return the run that the user names, of the runs that the named times make of a table."""
+    if len(parts) == 1:
+        return parts[0]
+    names = tuple(each.run for each in parts)
+    if run is None:
+        raise NeedsAnswer(Question(path, (MissingItem(Missing.RUN, names, names[0]),)))
+    return parts[_index_of_name(path, Missing.RUN, [(each,) for each in names], run)]
 
 
 def _with_time_unit(path: str, table: Table, unit: str) -> Table:
@@ -209,16 +248,22 @@ def _with_time_unit(path: str, table: Table, unit: str) -> Table:
         raise FormatError(path, f'time unit must be one of {", ".join(TIMES)}, got "{unit}"', "name one of these")
     if table.times is None:
         raise FormatError(path, f"time unit {unit} was given, but there is no column of times", "leave it out")
-    of_file = unit_words(table.times.unit)
+    times, of_file = table.times, unit_words(table.times.unit)
+    traps = table.traps
     if time_unit(of_file) is not None and of_file != unit_words(unit):
-        raise FormatError(path, f'time unit must be {of_file} as stated by the file, got "{unit}"', "leave it out")
-    return replace(table, times=replace(table.times, unit=unit))
+        message = f'you stated the unit {unit} for "{times.label}": the unit of the file is not used'
+        traps = (*traps, FormatIssue("unit_given", message))
+    return replace(table, times=replace(times, unit=unit), traps=traps)
 
 
-def _missing_times(columns: Sequence[Column], table: Table, column: Column, answers: ReadOptions) -> list[MissingItem]:
+def _missing_times(
+    path: str, columns: Sequence[Column], table: Table, column: Column, answers: ReadOptions
+) -> list[MissingItem]:
     if not table.is_timed:
         if answers.rate_hz is not None:
             return []
+        if table.unread_times:
+            raise FormatError(path, table.unread_times, _READ_TIMES)
         others = tuple(each.name for each in columns if each.name != column.name)
         return [rate_needed(MissingItem(Missing.TIME, others, others[0]) if others else None)]
     if table.times is None or table.formula is not None or time_unit(table.times.unit) is not None:

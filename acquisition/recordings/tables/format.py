@@ -11,9 +11,10 @@ from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.reading import READ_DEFAULTS, ReadOptions
 from acquisition.recordings.recording import FormatIssue, Recording, Survey
 from acquisition.recordings.sampling.flags import common_step
+from acquisition.recordings.tables.blocks import by_label, runs_of, with_units_of_rows
 from acquisition.recordings.tables.channel import check_lengths, read_channel, read_samples, rows_of
 from acquisition.recordings.tables.rows import read_rows
-from acquisition.recordings.tables.table import Column, Header, Table, TableFacts, names_apart, set_back, side_by_side
+from acquisition.recordings.tables.table import Column, Header, Table, TableFacts, names_apart, side_by_side
 from acquisition.recordings.tables.text import Text, head_lines, text_of
 from acquisition.units import NUMBER
 
@@ -46,7 +47,7 @@ class ColumnFormat:
         return bool(self.evidence(head))
 
     def _runs(self, path: str, data: bytes) -> list[Table]:
-        return [part for table in self.tables(path, data) for part in set_back(table)]
+        return [part for table in self.tables(path, data) for part in runs_of(table)]
 
     def read(self, path: str, data: bytes, reading: ReadOptions = READ_DEFAULTS) -> Recording:
         """Read one channel of one run; see :class:`springmass.extend.Format`."""
@@ -146,10 +147,11 @@ def text_format(
 
 def _tables(path: str, text: Text, begin: int, header: Header, stop: int) -> list[Table]:
     """Read the rows below a header that begins at a line."""
-    read = read_rows(path, text, begin + header.lines, stop, header.delimiter, header.clock)
+    read = read_rows(path, text, begin + header.lines, stop, header.delimiter, header.clocks, header.words)
     facts = {each.name: getattr(header, each.name) for each in fields(TableFacts)}
-    common = replace(read, **{**facts, "traps": (*header.traps, *read.traps)})
-    tables = side_by_side(common, header.headings, header.run)
+    columns, headings = with_units_of_rows(read.columns, header.headings)
+    common = replace(read, columns=columns, **{**facts, "traps": (*header.traps, *read.traps)})
+    tables = by_label(side_by_side(common, headings, header.run))
     if not tables:
         raise FormatError(path, "expected a column beside the times, got none", "export what was measured too")
     return tables

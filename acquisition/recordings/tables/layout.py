@@ -13,9 +13,10 @@ from acquisition.block import F8
 from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.sampling.timing import Formula
 from acquisition.recordings.tables.headings import Heading, heading_of, is_time, is_uncertainty, split_heading
-from acquisition.recordings.tables.numbers import is_lost, parse_number
+from acquisition.recordings.tables.numbers import THOUSANDS, is_lost, parse_number
+from acquisition.recordings.tables.numbers import cell as number_form
 from acquisition.recordings.tables.table import Header
-from acquisition.recordings.tables.times import CLOCK
+from acquisition.recordings.tables.times import in_order, is_newest_first, is_time_cell
 from acquisition.recordings.tables.vocabulary import INDEX, NEUTRAL, NUMBERED, SPAN
 from acquisition.units import measure_of, time_unit
 
@@ -34,6 +35,7 @@ _SEP = re.compile(r"[\ufeff\"]*sep=(.)")  # a line of Excel
 _FIRST_NUMBERS = 10  # row numbers begin below this; the first may be missing, in rows unlike the others
 _NONE = ("", "lost")
 """Kinds of cells that may stand in any column."""
+_RESTARTS = 0.1  # maximum share of steps back in a column that is named as times
 _SPARSE = 0.2  # minimum share of rows with a number in a column of samples
 _CAPITAL = re.compile(r"(?<![^\W\d_])T(?![^\W\d_])")
 
@@ -50,8 +52,22 @@ def find_table(lines: tuple[str, ...]) -> Header | None:
     for order, mark in enumerate(separator_line[1] if separator_line else _MARKS):
         # Without its mark each line is a single cell, a case that the first separator has covered.
         if (not order or not mark or any(mark in each for each in lines)) and (table := _split_by(lines, mark)):
-            candidates.append(((table.lines, not table.named, not _is_separator(table), order), table))
+            candidates.append(((_is_torn(table), table.lines, not table.named, not _is_separator(table), order), table))
     return min(candidates)[1] if candidates else None
+
+
+def _is_torn(table: Header) -> bool:
+    """Return whether a cell has another separator inside, or a time and a number: its comma is a decimal comma."""
+    return any(
+        any(mark in cell for mark in "\t;") or (" " in cell and _holds_time_and_number(cell))
+        for cell in table.rows[0]
+        if parse_number(cell) is None
+    )
+
+
+def _holds_time_and_number(cell: str) -> bool:
+    time, _, number = cell.rpartition(" ")
+    return not is_time_cell(cell) and is_time_cell(time) and parse_number(number) is not None
 
 
 def _is_separator(table: Header) -> bool:
@@ -69,7 +85,9 @@ def _split_by(lines: Sequence[str], mark: str) -> Header | None:
     """Find the first rows of numbers in lines with a separator; None if there are none."""
     filled = [at for at, each in enumerate(lines) if each.strip(mark + " " if mark else "\t ")]
     cells = [_cells(lines[at], mark) for at in filled]
-    kinds = [[_kind(cell) for cell in row] for row in cells]
+    kinds = [
+        ["number" if mark and THOUSANDS.fullmatch(cell.encode()) else _kind(cell) for cell in row] for row in cells
+    ]
     for at, first in enumerate(kinds):
         if not _is_row(first) or cells[at][0] == "-" or any("=" in cell for cell in cells[at]):
             continue  # "- 0.5" is a list of YAML
@@ -112,7 +130,7 @@ def _kind(cell: str) -> str:
         return "lost"
     if (quantity := _QUANTITY.fullmatch(cell)) and measure_of(quantity[1]) is not None:
         return "mixed"
-    if CLOCK.fullmatch(cell):
+    if is_time_cell(cell):
         return "clock"
     if _DATE.fullmatch(cell):
         return "text"
@@ -206,7 +224,7 @@ def _names(line: str, mark: str, width: int, *, numbered: bool = False) -> list[
     if width == 1 and (_SETTING.search(plain) or len(plain.split()) > _LONGEST_NAME):
         return []
     for cells in _splits(plain, mark, width):
-        words = [cell for cell in cells if cell and parse_number(cell) is None and not CLOCK.fullmatch(cell)]
+        words = [cell for cell in cells if cell and parse_number(cell) is None and not is_time_cell(cell)]
         if words and (numbered or 2 * len(words) >= len([cell for cell in cells if cell])):
             return cells
     return []
@@ -310,18 +328,33 @@ def is_aside(heading: Heading, column: F8, others: bool) -> bool:
     return index or is_uncertainty(name) or bool(np.mean(np.isfinite(column)) < _SPARSE)
 
 
-def times_by_name(headings: Sequence[Heading], columns: Sequence[F8]) -> list[int]:
+def are_named_times(heading: Heading) -> bool:
+    """Return whether a heading names times; a capital T does not, because it often denotes a period."""
+    fits = not heading.unit or time_unit(heading.unit) is not None
+    return is_time(heading.name) and not _CAPITAL.search(heading.name) and fits
+
+
+def times_by_name(table: Header, columns: Sequence[F8]) -> list[int]:
     """Return the rising columns that are named as times, and the first column if its even steps have a unit of time.
 
-    A capital T is not accepted as a name of times, because it often denotes a period.
+    A column that is named counts as rising if its times can be put in order, or start again.
     """
     named = [
         column
-        for column, each in enumerate(headings)
-        if (is_time(each.name) and not _CAPITAL.search(each.name) and not (each.unit and time_unit(each.unit) is None))
+        for column, each in enumerate(table.headings)
+        if are_named_times(each)
         or (column == 0 and time_unit(each.unit) is not None and not SPAN.search(each.name) and _is_even(columns[0]))
     ]
-    return [column for column in named if runs_forward(columns[column])]
+    return [column for column in named if _may_be_times(columns[column], [row[column] for row in table.rows])]
+
+
+def _may_be_times(column: F8, cells: Sequence[str]) -> bool:
+    if runs_forward(column) or is_newest_first(column):
+        return True
+    forms = np.array([number_form(cell)[1] for cell in cells[: column.size]], np.int8) if cells else None
+    steps = np.diff(column[np.isfinite(column)])
+    again = steps.size and np.mean(steps < 0) <= _RESTARTS and np.mean(steps > 0) >= 0.5
+    return bool(again) or runs_forward(in_order(column, forms)[0])
 
 
 def times_by_steps(headings: Sequence[Heading], columns: Sequence[F8]) -> int | None:

@@ -39,8 +39,10 @@ _MINUS = re.compile(
 )
 _POWER = re.compile(r"(?<=\d)[ \xa0]?(?:[×·][ \xa0]?10\^?|[اأ]س)(?=[-+\u2212\d])")
 _SPACE = re.compile(r"(?<!\d)[\xa0\u2007\u2009\u202f]|[\xa0\u2007\u2009\u202f](?!\d)")
-_MARKS = {0x66B: ".", 0x66C: "'", 0x60C: ",", 0x61B: ";", 0xFF0E: ".", 0xFF0C: ",", 0xFF1B: ";"}
-_NO_WIDTH = dict.fromkeys((0x200B, 0x200E, 0x200F, 0x61C))
+_MARKS = {0x60C: ",", 0x61B: ";", 0xFF0E: ".", 0xFF0C: ",", 0xFF1B: ";"}
+_OF_NUMBERS = "\u2212\u2013\ufe63\uff0d\xa0\u2007\u2009\u202f\u066b\u066c\u200b\u200e\u200f\u061c×·"
+_ALWAYS = {0x66B: ".", 0x66C: "'", **dict.fromkeys((0x200B, 0x200E, 0x200F, 0x61C))}
+THOUSANDS = re.compile(rb"[-+]?[1-9]\d{0,2}((?:[,. ']|\xc2?\xa0|\xe2\x80[\xaf\x99\x89])\d{3})+([.,]\d*)?")
 _LONGEST = 64  # bytes of a cell that are examined; longer cells are rare and are read one by one
 _DIGIT, _SIGN, _MARK, _E, _OTHER = 1, 2, 3, 4, 5
 _KINDS = np.full(256, _OTHER, np.uint8)
@@ -56,7 +58,9 @@ def plain(text: str) -> str:
         return text
     others = [each for each in set(text) if each > "\x7f"]
     digits = {ord(each): str(unicodedata.decimal(each)) for each in others if each.isdecimal()}
-    text = text.translate({**(_MARKS if digits else {}), **_NO_WIDTH, **digits})
+    if not digits and not any(each in _OF_NUMBERS for each in others):  # the usual case: letters of headings
+        return text
+    text = text.translate({**(_MARKS if digits else {}), **_ALWAYS, **digits})
     return _MINUS.sub("-", _POWER.sub("e", _SPACE.sub(" ", text)))
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import zip_longest
 
 import numpy as np
@@ -11,25 +11,36 @@ import numpy as np
 from acquisition.block import B1, F8
 from acquisition.errors import FormatError
 from acquisition.recordings.recording import FormatIssue
-from acquisition.recordings.tables.numbers import EMPTY_CELL, EXPONENT, I1, UNREAD_CELL, is_cut, read_cells, split_page
+from acquisition.recordings.tables.numbers import (
+    EMPTY_CELL,
+    EXPONENT,
+    I1,
+    THOUSANDS,
+    UNREAD_CELL,
+    is_cut,
+    read_cells,
+    split_page,
+)
 from acquisition.recordings.tables.table import Column, Lines, Table
-from acquisition.recordings.tables.text import Text
-from acquisition.recordings.tables.times import clock_times, count_from_first
+from acquisition.recordings.tables.text import Text, decode
+from acquisition.recordings.tables.times import clock_times
 
 _MOST_EMPTY = 4_000_000
 """Cells that rows may lack, in addition to one for every byte, before the table counts as damaged."""
 _REMEDY = "export the numbers without thousands separators"
-_THOUSANDS = re.compile(rb"[-+]?[1-9]\d{0,2}((?:[,. ']|\xc2?\xa0|\xe2\x80[\xaf\x99])\d{3})+([.,]\d*)?")
 
 
-def read_rows(path: str, text: Text, first: int, stop: int, mark: str, clock: int | None = None) -> Table:
+def read_rows(
+    path: str, text: Text, first: int, stop: int, mark: str, clocks: Sequence[int] = (), words: Sequence[int] = ()
+) -> Table:
     """Read the rows from line ``first`` to before line ``stop``, as columns without names; blank lines are no rows.
 
-    The cells of column ``clock`` are times of day.
+    The cells of columns ``clocks`` are times of day or durations; those of ``words`` are kept as text too.
     """
     first = min(first, stop)
     pieces: list[list[tuple[F8, I1, B1]]] = []  # for each column
     sizes: list[int] = []
+    cells_of: dict[int, list[bytes]] = {at: [] for at in (*clocks, *words)}
     numbers = [np.empty(0, np.int64)]
     most, count, number, last = int(text.starts[stop] - text.starts[first]) + _MOST_EMPTY, 0, first + 1, []
     for page in text.pages(first, stop):
@@ -49,19 +60,27 @@ def read_rows(path: str, text: Text, first: int, stop: int, mark: str, clock: in
             if missing := count - sizes[at]:
                 empty = np.full(missing, np.nan), np.full(missing, EMPTY_CELL, np.int8), np.zeros(missing, bool)
                 pieces[at].append(empty)
-            pieces[at].append(read_cells(cells) if at != clock else clock_times(cells))
+            pieces[at].append(read_cells(cells))
+            if at in cells_of:
+                cells_of[at] += [b""] * (count - len(cells_of[at])) + list(cells)
             sizes[at] = count + len(rows)
             for row in np.flatnonzero(pieces[at][-1][1] == UNREAD_CELL).tolist() if mark else ():
-                if _THOUSANDS.fullmatch(cells[row]):
+                if THOUSANDS.fullmatch(cells[row]):
                     shown = cells[row].decode("utf-8", "replace")
                     problem = f'expected plain numbers, got a thousands separator in "{shown}"'
                     raise FormatError(path, problem, _REMEDY)
         count, last = count + len(rows), rows[-1]
-    columns, commas = [], []
+    columns: list[Column] = []
+    commas: list[B1] = []
     for of_column in pieces:
         values, decimals, comma = (np.concatenate(each) for each in zip(*of_column, strict=True))
         of_column.clear()
+        if len(columns) in clocks:
+            values, decimals = clock_times(cells_of[len(columns)])
         columns.append(Column("", "", values, decimals))
+        if len(columns) - 1 in words:
+            as_text = np.array([decode(cell).strip('"') for cell in cells_of[len(columns) - 1]])
+            columns[-1] = replace(columns[-1], words=as_text)
         commas.append(comma)
     traps = _decimal_marks(path, columns, commas)
     ended = first >= stop or stop < len(text) or text.ended
@@ -71,10 +90,8 @@ def read_rows(path: str, text: Text, first: int, stop: int, mark: str, clock: in
         if is_cut(own_values, own_decimals):
             own_values[-1], own_decimals[-1] = np.nan, UNREAD_CELL
         cut = any(column.values.size == count and column.forms[-1] == UNREAD_CELL for column in columns)
-    if clock is not None and clock < len(columns):
-        count_from_first(columns[clock])
-    words = columns[0].of_size(count).forms == UNREAD_CELL if columns else np.zeros(0, bool)
-    where = Lines(np.concatenate(numbers), words, ended, cut, text.zeros)
+    begin_with_text = columns[0].of_size(count).forms == UNREAD_CELL if columns else np.zeros(0, bool)
+    where = Lines(np.concatenate(numbers), begin_with_text, ended, cut, text.zeros)
     return Table(tuple(columns), lines=where, traps=traps)
 
 

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquisition.block import B1, F8, I8
 from acquisition.recordings.recording import FormatIssue
-from acquisition.recordings.sampling.timing import Formula, median
+from acquisition.recordings.sampling.timing import Formula
 from acquisition.recordings.tables.headings import Heading, role_of, unique
 from acquisition.recordings.tables.numbers import EMPTY_CELL, I1
 from acquisition.recordings.tables.vocabulary import ACCELERATION
 from acquisition.units import Measure, measure_of
-
-_SET_BACK, _MOST_SET, _FEWEST_ROWS = 50.0, 3, 50
-"""A clock was set back if it steps back by so many usual steps, at most so often, with so many rows in each part."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,6 +35,8 @@ class Column:
         -3 for a cell that is not a number. None for binary numbers.
     aside : bool
         Whether it is an auxiliary column (row numbers, an uncertainty), which is read only if the user names it.
+    words : (n,) array of str or None
+        The text of its cells, if rows are told apart by it.
     differences : bool
         Whether each value is the difference from the row before, so that the first may be absent.
     """
@@ -47,6 +46,7 @@ class Column:
     values: F8
     decimals: I1 | None = None
     aside: bool = False
+    words: NDArray[np.str_] | None = None
     differences: bool = False
 
     @property
@@ -76,10 +76,12 @@ class Column:
         """Whether its unit is a length."""
         return self.measure is not None and self.measure.quantity == "length"
 
-    def part(self, start: int, stop: int) -> Column:
-        """Return some of its rows."""
-        decimals = None if self.decimals is None else self.decimals[start:stop]
-        return replace(self, values=self.values[start:stop], decimals=decimals)
+    def taken(self, rows: I8) -> Column:
+        """Return its rows with these numbers, as far as it has them."""
+        rows = rows[rows < self.values.size]
+        decimals = None if self.decimals is None else self.decimals[rows]
+        words = None if self.words is None else self.words[rows]
+        return replace(self, values=self.values[rows], decimals=decimals, words=words)
 
     def of_size(self, size: int) -> Column:
         """Return the column with empty cells up to a size."""
@@ -126,6 +128,8 @@ class TableFacts:
         Whether a channel may end before its times, because longer channels share them.
     traps : tuple of FormatIssue
         Remarks on the file as a whole.
+    unread_times : str
+        Why a column that is named as times is not used; empty if there is none.
     """
 
     formula: Formula | None = None
@@ -134,6 +138,7 @@ class TableFacts:
     start_time: str = ""
     ragged: bool = False
     traps: tuple[FormatIssue, ...] = ()
+    unread_times: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -150,8 +155,10 @@ class Header(TableFacts):
         The separator of cells; empty for runs of white space.
     headings : sequence of Heading
         One for each column.
-    clock : int or None
-        A column of times of day.
+    clocks : tuple of int
+        Columns of times of day or durations.
+    words : tuple of int
+        Columns of text that may hold the units of each row, or tell its rows apart.
     refused : tuple of str or None
         Why the rows cannot be read, and what to do.
     rows : tuple of tuple of str
@@ -162,7 +169,8 @@ class Header(TableFacts):
     lines: int
     delimiter: str
     headings: Sequence[Heading]
-    clock: int | None = None
+    clocks: tuple[int, ...] = ()
+    words: tuple[int, ...] = ()
     refused: tuple[str, str] | None = None
     rows: tuple[tuple[str, ...], ...] = ()
 
@@ -227,35 +235,6 @@ def side_by_side(table: Table, headings: Sequence[Heading], run: str = "") -> li
             beside=columns,
         )
         for (own_run, time), of_channel in channels.items()
-    ]
-
-
-def set_back(table: Table) -> list[Table]:
-    """Return the parts of a table whose clock was set back, as runs: few steps back with many rows around each."""
-    if table.times is None or table.lines is None:
-        return [table]
-    t = table.times.of_size(table.lines.rows).values
-    if not (t[1:] < t[:-1]).any():
-        return [table]
-    steps = np.diff(t)
-    usual = median(np.abs(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else 0.0
-    back = np.flatnonzero(steps < 0) + 1
-    edges = [0, *back.tolist(), t.size]
-    clear = bool((steps[back - 1] < -_SET_BACK * usual).all())
-    if not 1 <= back.size <= _MOST_SET or not clear or min(np.diff(edges)) < _FEWEST_ROWS:
-        return [table]
-    numbers, words, *at_the_end = table.lines
-    return [
-        replace(
-            table,
-            columns=tuple(each.part(start, stop) for each in table.columns),
-            times=table.times.part(start, stop),
-            # Only the last part ends where the file ends.
-            lines=Lines(numbers[start:stop], words[start:stop], *(at_the_end if stop == t.size else ())),
-            beside=tuple(each.part(start, stop) for each in table.beside),
-            run=f"{table.run}, part {number}" if table.run else f"Part {number}",
-        )
-        for number, (start, stop) in enumerate(pairwise(edges), 1)
     ]
 
 

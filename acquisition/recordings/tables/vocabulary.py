@@ -35,10 +35,35 @@ NEUTRAL = _pattern(
 """Names that do not prevent a column from being read as the times."""
 SPAN = _pattern(r"^(?-i:T)\b|^[Ττ]|period|durat|dauer|half|halb|interval|tau|delay|[dΔ]t|mean|10")
 """Names of durations, which are not times of samples."""
-AM_PM = {
-    "am": "am a.m. a.m a. m. de. öö ap. πμ ص ق.ظ. 上午 午前 오전 sa fm f.m. dop. dopoledne vorm. पूर्वाह्न",
-    "pm": "pm p.m. p.m p. m. du. ös ip. μμ م ب.ظ. 下午 午後 오후 ch em e.m. odp. odpoledne nachm. अपराह्न",
-}
+AM = _pattern(
+    r"(?<![^\W\d_])"
+    r"(?:a\.? ?m\.?|de\.|öö|дп|לפנה״צ"
+    r"|πμ|π\.μ\.|ص|ق\.ظ\.|上午|午前|早上|오전|sa|fm|f\.m\.|dop\.|vm\.?|vorm\.)(?![^\W\d_])"
+)
+PM = _pattern(
+    r"(?<![^\W\d_])"
+    r"(?:p\.? ?m\.?|du\.|ös|пп|אחה״צ"
+    r"|μμ|μ\.μ\.|م|ب\.ظ\.|下午|午後|晚上|오후|ch|em|e\.m\.|odp\.|nm\.?|nachm\.)(?![^\W\d_])"
+)
+"""Words for the halves of the day; the word for the second half is looked for first."""
+MONTHS = tuple(
+    words(stems)
+    for stems in (
+        "jan gen ene янв січ ιαν oca sty led tammi jän كانون يناير",
+        "feb fév fev фев лют φεβ şub lut úno helmi فبراير",
+        "mar mär mrt мар бер μαρ bře maalis mär مارس",
+        "apr avr abr апр кві απρ nis kwi dub huhti ápr أبريل",
+        "may mai mei mag maj máj мая май тра μαΐ μαϊ μάι kvě touko مايو",
+        "jun juin giu июн чер ιουν haz cze čvn červn kesä jún يونيو",
+        "jul juil lug июл лип ιουλ tem lip čvc červenec heinä júl يوليو",
+        "aug ago aoû aou авг сер αυγ ağu sie srp elo أغسطس",
+        "sep set сен вер σεπ eyl wrz zář syys szep سبتمبر",
+        "oct okt ott out окт жов οκτ eki paź říj loka أكتوبر",
+        "nov noi ноя лис νοέ νοε kas lis marras نوفمبر",
+        "dec dez déc dic дек гру δεκ ara gru pro joulu ديسمبر",
+    )
+)
+"""Stems of the names of the twelve months; the longest that fits decides."""
 
 # Row numbers and uncertainties
 
@@ -67,6 +92,9 @@ UNIT_OF_NAME = (
     (_pattern(r"force|kraft|forza|fuerza"), "N"),
 )
 """What a channel without a unit probably measures: the unit that a question gives as its example."""
+FREQUENCY = _pattern(r"^(freq\w*|frequen[zc]\w*|fréquence|frecuencia|częstotliwość|частота|频率|周波数|f)$")
+AUTOCORRELATION = _pattern(r"auto[-_ ]?[ck]orr|korrelation|\blag\b|time shift|zeitversch")
+"""Names of a frequency, against which spectra are tabulated, and of autocorrelations and their shifts of time."""
 MOTION = words(
     "position velocity acceleration posizione velocità velocita accelerazione ort weg geschwindigkeit beschleunigung "
     "vitesse accélération posición velocidad aceleración 位置 速度 加速度"
@@ -80,3 +108,10 @@ LOST = words(
     "ovrflw ovfl under underrange underflow #value! #div/0! #ref! #num! #null! #name? missing invalid lost timeout"
 )
 """Words in a column of numbers that an instrument or a sheet writes where it has no number."""
+LABEL = words(
+    "sensor sensors channel probe device source quantity variable field series parameter topic id name key signal "
+    "metric tag label kanal größe messgröße sonde capteur canal grandeur variable magnitud entity node station"
+)
+"""Words in the heading of a column that tells rows of several sensors or quantities apart."""
+ANY_VALUE = frozenset(("", *words("value values _value reading result wert messwert valeur valor valore data")))
+"""Names of a column whose rows are of several quantities."""

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import datetime
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from acquisition.errors import FormatError
+from acquisition.block import Flag
+from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.identify import open_recording
 from acquisition.recordings.reading import ReadOptions
 from acquisition.recordings.recording import Recording
@@ -101,3 +103,261 @@ def test_numbers_that_are_all_in_brackets_are_not_negative(tmp_path: Path) -> No
     """Brackets mean a sign only next to numbers without brackets."""
     with pytest.raises(FormatError):
         read(tmp_path, table([f"{t:.2f}" for t in T], [f"({x + 9:.3f})" for x in X], head="a;b"), rate_hz=20.0)
+
+
+# Times
+
+BEGUN = datetime.datetime(2025, 4, 17, 16, 59, 59)
+MOMENTS = [BEGUN + datetime.timedelta(seconds=t) for t in T.tolist()]
+
+
+def stamps(pattern: str) -> list[str]:
+    """Return clock times; ``{ms}`` stands for three digits of milliseconds, ``{h}`` for an hour without a zero."""
+    return [
+        each.strftime(pattern.replace("{ms}", f"{each.microsecond // 1000:03d}").replace("{h}", f"{each.hour % 12}"))
+        for each in MOMENTS
+    ]
+
+
+STAMPS = {
+    "MATLAB": "%d-%b-%Y %H:%M:%S.{ms}",
+    "English": "Apr %d, %Y {h}:%M:%S.{ms} PM",
+    "ctime": "%a Apr %d %H:%M:%S.{ms} %Y",
+    "Spanish": "{h}:%M:%S.{ms} p. m.",
+    "Spanish date": "17 de abril de 2025 %H:%M:%S.{ms}",
+    "German": "17. April 2025, %H:%M:%S,{ms} Uhr",
+    "French": "jeu. 17 avr. 2025 %H:%M:%S,{ms}",
+    "Russian": "17 апр. 2025 г., %H:%M:%S.{ms}",
+    "Turkish": "17 Nis 2025 %H:%M:%S.{ms}",
+    "Greek": "{h}:%M:%S.{ms} μ.μ.",
+    "Chinese": "2025年4月17日 下午{h}:%M:%S.{ms}",
+    "Korean": "오후 {h}:%M:%S.{ms}",
+    "Finnish": "17.4.2025 %H.%M.%S,{ms}",
+    "compact ISO": "%Y%m%dT%H%M%S.{ms}Z",
+    "Apache": "17/Apr/2025:%H:%M:%S.{ms} +0200",
+    "minutes of the hour": "%M:%S.{ms}",
+    "twelve hours": "{h}:%M:%S.{ms}",
+    "day before month": "17/04/25 %H:%M:%S.{ms}",
+}
+
+
+@pytest.mark.parametrize("order", [1, -1])
+@pytest.mark.parametrize("form", STAMPS)
+def test_clock_times_are_counted_from_the_first(tmp_path: Path, form: str, order: int) -> None:
+    """In every language, over a full hour, and also newest first."""
+    times = [f'"{each}"' for each in stamps(STAMPS[form])][::order]
+    holds(read(tmp_path, table(times, [f"{x:.3f}" for x in X][::order], head="Time;Position (cm)")))
+
+
+DURATIONS = {
+    "pandas": lambda t: f"0 days 00:00:{9 + t:09.6f}",
+    "Python": lambda t: f"0:00:{9 + t:09.6f}",
+    "ISO": lambda t: f"PT{9 + t:.2f}S",
+    "seconds": lambda t: f"{9 + t:.2f} sec",
+    "milliseconds": lambda t: f"{1000 * (9 + t):.0f} ms",
+    "parts": lambda t: f"0 min {9 + t:.2f} s",
+}
+
+
+@pytest.mark.parametrize("form", DURATIONS)
+def test_durations_with_units_are_times(tmp_path: Path, form: str) -> None:
+    """They are not counted from the first."""
+    times = [DURATIONS[form](t) for t in T]
+    if form == "Python":
+        holds(read(tmp_path, table(times, [f"{x:.3f}" for x in X], head="Time;Position (cm)")))
+    else:
+        holds(read(tmp_path, table(times, [f"{x:.3f}" for x in X], head="Time;Position (cm)")), T + 9)
+
+
+LONG = np.arange(6000) / 20
+COUNTERS = {
+    "16 bits": (np.round(1000 * LONG) % 65536, "ms"),
+    "16 bits with a sign": ((np.round(1000 * LONG) + 32768) % 65536 - 32768, "ms"),
+    "32 bits": ((np.round(1e6 * LONG) + 4.2e9) % 2**32, "us"),
+    "32 bits with a sign": ((np.round(1e6 * LONG) + 2.1e9 + 2**31) % 2**32 - 2**31, "us"),
+    "31 bits": ((np.round(1000 * LONG) + 2147400000) % 2**31, "ms"),
+    "seconds of the minute": ((LONG + 17.0) % 60, "s"),
+    "seconds of the hour": ((LONG + 3590.0) % 3600, "s"),
+}
+
+
+@pytest.mark.parametrize("counter", COUNTERS)
+def test_a_counter_that_wraps_goes_on(tmp_path: Path, counter: str) -> None:
+    """All rows are one recording, and the wrap is noted."""
+    t, unit = COUNTERS[counter]
+    values = [f"{x:.3f}" for x in 5.0 * np.cos(6.0 * LONG)]
+    cells = [f"{each:.2f}" if unit == "s" else f"{each:.0f}" for each in t]
+    recording = read(tmp_path, table(cells, values, head=f"time ({unit});Position (cm)"))
+    np.testing.assert_allclose(np.diff(recording.samples.t), 0.05, atol=1e-6)
+    assert not recording.samples.flags.any()
+    assert [each for each in recording.traps if each.code == "times_mended"]
+
+
+@pytest.mark.parametrize("form", ["{s}.{ms}", "17:0:{s}.{ms}", "17:00:{s:02d}:{ms}"])
+def test_milliseconds_without_zeros_are_whole_numbers(tmp_path: Path, form: str) -> None:
+    """12.40 is 12.040 s if the digits behind the point never begin with zero."""
+    millis = np.arange(3000) * 10
+    times = [form.format(s=each // 1000, ms=each % 1000) for each in millis.tolist()]
+    recording = read(tmp_path, table(times, [f"{x:.3f}" for x in np.cos(0.05 * millis)], head="time;Position (cm)"))
+    np.testing.assert_allclose(recording.samples.t, millis / 1000, atol=1e-9)
+
+
+def test_rows_that_come_newest_first_are_turned(tmp_path: Path) -> None:
+    """The times rise, and this is noted."""
+    recording = read(tmp_path, table([f"{t:.2f}" for t in T[::-1]], [f"{x:.3f}" for x in X[::-1]]))
+    holds(recording)
+    assert [each for each in recording.traps if each.code == "times_mended"]
+
+
+def test_three_rows_out_of_place_are_sorted(tmp_path: Path) -> None:
+    """A row that arrived late takes its place; a time that is wrong stays flagged."""
+    order = np.arange(N)
+    order[[10, 11, 30, 31, 32]] = [11, 10, 32, 30, 31]
+    holds(read(tmp_path, table([f"{t:.2f}" for t in T[order]], [f"{x:.3f}" for x in X[order]])))
+    wrong = T.copy()
+    wrong[20] = 0.35
+    recording = read(tmp_path, table([f"{t:.2f}" for t in wrong], [f"{x:.3f}" for x in X]))
+    assert np.flatnonzero(recording.samples.flags & Flag.NON_MONOTONIC_TIME.value).tolist() == [20]
+
+
+@pytest.mark.parametrize("parts", [2, 5, 12])
+@pytest.mark.parametrize("again", ["", "Time (s);Position (cm)\n"])
+def test_a_clock_that_starts_again_begins_another_run(tmp_path: Path, parts: int, again: str) -> None:
+    """Rows are never joined across a step back, however many there are, with or without headings in between."""
+    one = table([f"{t:.2f}" for t in T], [f"{x:.3f}" for x in X])
+    text = one + (again + one.split("\n", 1)[1]) * (parts - 1)
+    with pytest.raises(NeedsAnswer) as asked:
+        read(tmp_path, text)
+    (need,) = asked.value.question.needs
+    assert len(need.choices) == parts
+    for run in need.choices[:2]:
+        recording = read(tmp_path, text, run=run)
+        holds(recording)
+        assert not recording.malformed_rows
+
+
+def test_a_column_of_times_that_cannot_be_read_is_named(tmp_path: Path) -> None:
+    """The answer does not invite a rate that nobody measured; a stated rate is taken."""
+    text = table([f"tick {t:.2f}!" for t in T], [f"{x:.3f}" for x in X], head="Time;Position (cm)")
+    with pytest.raises(FormatError) as refused:
+        read(tmp_path, text)
+    assert not isinstance(refused.value, NeedsAnswer)
+    assert '"Time"' in str(refused.value)
+    with pytest.raises(FormatError, match='"Time"'):
+        read(tmp_path, text, time="Time")
+    holds(read(tmp_path, text, rate_hz=20.0))
+
+
+# Blocks
+
+OTHER = np.round(9.0 + 0.5 * np.cos(4.0 * T), 3)
+
+
+@pytest.mark.parametrize("heading", ["sensor", "who", "_field"])
+@pytest.mark.parametrize("in_turn", [True, False])
+def test_rows_of_several_sensors_are_channels(tmp_path: Path, heading: str, in_turn: bool) -> None:
+    """A long table has one reading a row, and the name of the sensor in a column of words."""
+    a, b = (
+        [f"{t + late:.3f},{name},{x:.3f}" for t, x in zip(T, values, strict=True)]
+        for name, values, late in (("left", X, 0.0), ("right", OTHER, 0.008))
+    )
+    rows = [row for pair in zip(a, b, strict=True) for row in pair] if in_turn else a + b
+    text = "\n".join([f"time_s,{heading},distance_cm", *rows, ""])
+    if not in_turn and heading == "who":  # words that change once are a state
+        text = text.replace("who", "sensor")
+    with pytest.raises(NeedsAnswer) as asked:
+        read(tmp_path, text)
+    assert asked.value.question.needs[0].choices == ("distance left", "distance right")
+    holds(read(tmp_path, text, channel="distance left"))
+    holds(read(tmp_path, text, channel="distance right"), T + 0.008, OTHER)
+
+
+def test_a_state_in_words_is_no_sensor(tmp_path: Path) -> None:
+    """Values go on from row to row, whatever the words say."""
+    rows = [f"{t:.2f},{'low' if row % 3 else 'ok'},{x:.3f}" for row, (t, x) in enumerate(zip(T, X, strict=True))]
+    holds(read(tmp_path, "\n".join(["Time (s),state,Position (cm)", *rows, ""])))
+
+
+UNITS_OF_ROWS = {
+    "column": ("Time (s),Value,Unit", "{t:.2f},{x},{u}"),
+    "behind, in cells": ("Time (s);Value", "{t:.2f};{x} {u}"),
+    "behind both": ("Time;Value", "{t:.2f} s;{x} {u}"),
+    "blanks": ("", "{t:.2f} {x} {u}"),
+}
+
+
+@pytest.mark.parametrize("form", UNITS_OF_ROWS)
+def test_the_unit_of_each_row_is_used(tmp_path: Path, form: str) -> None:
+    """Instruments choose the unit of each value; an answer that contradicts the rows is refused."""
+    head, row = UNITS_OF_ROWS[form]
+    values = np.round(100.0 + X, 2)
+    cells = [(f"{x / 100:.4f}", "m") if x >= 100 else (f"{10 * x:.1f}", "mm") for x in values]
+    text = "\n".join(
+        [*filter(None, [head]), *(row.format(t=t, x=x, u=u) for t, (x, u) in zip(T, cells, strict=True)), ""]
+    )
+    holds(read(tmp_path, text), x=values)
+    with pytest.raises(FormatError, match="states its unit"):
+        read(tmp_path, text, unit="cm")
+
+
+LINES = {
+    "numpy": ("{t}\n{x}\n", ","),
+    "MATLAB": ("t = [{t}];\nx = [{x}];\n", " "),
+    "names": ("Time (s);{t}\nPosition (cm);{x}\n", ";"),
+}
+
+
+@pytest.mark.parametrize("form", LINES)
+def test_two_long_lines_are_two_columns(tmp_path: Path, form: str) -> None:
+    """``numpy.savetxt`` of two arrays writes a line for each, longer than the head of a file."""
+    t = np.arange(3000) / 20
+    x = np.round(5.0 * np.cos(6.0 * t), 3)
+    line, mark = LINES[form]
+    text = line.format(t=mark.join(f"{each:.2f}" for each in t), x=mark.join(f"{each:.3f}" for each in x))
+    answers = {} if form == "names" else {"unit": "cm"}
+    holds(read(tmp_path, text, **answers), t, x)
+
+
+def test_annotated_csv_of_influxdb(tmp_path: Path) -> None:
+    """The bounds of the query are not the times of the rows."""
+    head = "#group,false,false,true,true,false,false,true\n#datatype,string,long,dateTime:RFC3339,dateTime:RFC3339,"
+    head += "dateTime:RFC3339,double,string\n#default,_result,,,,,,\n,result,table,_start,_stop,_time,_value,_field\n"
+    bounds = "2024-05-01T10:00:00Z,2024-05-01T11:00:00Z"
+    rows = [f",,0,{bounds},{at.isoformat()}Z,{x:.3f},distance" for at, x in zip(MOMENTS, X, strict=True)]
+    holds(read(tmp_path, "\n".join([head + rows[0], *rows[1:], ""]), unit="cm"))
+
+
+def test_an_answer_beats_the_heading(tmp_path: Path) -> None:
+    """A person who states the unit knows better; it is noted."""
+    text = table([f"{t:.2f}" for t in T], [f"{x:.3f}" for x in X], head="Time (s);Position (m)")
+    recording = read(tmp_path, text, unit="cm")
+    holds(recording)
+    assert [each for each in recording.traps if each.code == "unit_given"]
+
+
+# Values
+
+
+TURNS = [("deg", 360.0, "{:.2f}"), ("rad", 2 * np.pi, "{:.5f}"), ("", 65536, "{:.0f}")]
+
+
+@pytest.mark.parametrize(("unit", "turn", "form"), TURNS)
+@pytest.mark.parametrize("low", [0.0, -0.5])
+def test_jumps_by_a_turn_are_undone(tmp_path: Path, unit: str, turn: float, form: str, low: float) -> None:
+    """Angles and counters are written within one turn; the motion goes on beyond it, and this is noted."""
+    true = (low + 0.01 + 0.08 * np.cos(6.0 * T)) * turn
+    cells = [form.format((each - low * turn) % turn + low * turn) for each in true]
+    head = f"Time (s);Angle ({unit})" if unit else "Time (s);AcX"
+    answers = {} if unit else {"unit": "1"}
+    recording = read(tmp_path, table([f"{t:.2f}" for t in T], cells, head=head), **answers)
+    steps = np.diff(true) * (np.pi / 180 if unit == "deg" else 1.0)
+    np.testing.assert_allclose(np.diff(recording.samples.distance), steps, atol=turn * 1e-4)
+    assert [each for each in recording.traps if each.code == "values_unwrapped"]
+
+
+def test_a_stated_unit_of_times_beats_the_heading(tmp_path: Path) -> None:
+    """It is used and noted."""
+    text = table([f"{1000 * t:.0f}" for t in T], [f"{x:.3f}" for x in X])
+    recording = read(tmp_path, text, time_unit="ms")
+    holds(recording)
+    assert [each for each in recording.traps if each.code == "unit_given"]

@@ -20,6 +20,7 @@ ARRAYS: dict[str, tuple[Any, dict[str, str]]] = {
     "centimetres": ((T, 100.0 * Y), {"unit": "cm"}),
     "milliseconds": ((1000.0 * T, Y), {"time_unit": "ms"}),
     "coordinate in ms": (xr.DataArray(Y, coords={"time": ("time", 1000.0 * T, {"units": "ms"})}, dims="time"), {}),
+    "the only coordinate": (xr.DataArray(Y, coords={"t": ("t", 1000.0 * T, {"units": "ms"})}, dims="t"), {}),
     "data in mm": (xr.DataArray(1000.0 * Y, coords={"time": T}, dims="time", attrs={"units": "mm"}), {}),
     "headings of a CSV": (pd.DataFrame({"Time (s)": T, "Distance (cm)": 100.0 * Y}), {}),
     "index of times": (pd.Series(Y, index=T), {}),
