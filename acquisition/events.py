@@ -64,6 +64,12 @@ class Continued(_CameBack, frozen=True, tag="continues"):
     of: int | None = None
 
 
+class Shared(_Typed, frozen=True, tag="shared"):
+    """Another program reads a port, and takes a part of its bytes."""
+
+    port: str | None = None
+
+
 class TimedOut(_Typed, frozen=True, tag="timeout"):
     """A polled sensor did not answer in time."""
 
@@ -109,7 +115,20 @@ class Calibrated(_Typed, frozen=True, tag="calibration"):
     """A calibration applies to the whole recording; all of its facts are those of a ``Calibration``."""
 
 
-Event = Lost | Reopened | Replaced | Continued | TimedOut | Dropped | Zeroed | Triggered | Noted | RunEnded | Calibrated
+Event = (
+    Lost
+    | Reopened
+    | Replaced
+    | Continued
+    | Shared
+    | TimedOut
+    | Dropped
+    | Zeroed
+    | Triggered
+    | Noted
+    | RunEnded
+    | Calibrated
+)
 
 
 class _OfAnyKind(Struct, frozen=True):

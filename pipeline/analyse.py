@@ -7,40 +7,34 @@ by the windows, and by the last fit, which may take back only a window's false e
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
-from pipeline.analysis import Analysis, Oscillation, Still
+from pipeline.analysis import Analysis, Motion, Oscillation
 from pipeline.bench.scene import Scene
 from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.checks.echoes import echoes_by_chance, find_clusters
 from pipeline.checks.judge import judge
-from pipeline.checks.residual import COARSE
-from pipeline.closed import overdamped, still, two_modes, without_period
-from pipeline.damping.select import Damping, fit_laws
 from pipeline.findings.finding import worded
-from pipeline.findings.motion import damping_findings, fit_findings, motion_findings
+from pipeline.findings.motion import damping_findings, fit_findings, kind_findings, motion_findings
 from pipeline.findings.samples import clock_findings, part_findings, sample_findings
 from pipeline.findings.scene import scene_findings
-from pipeline.modes.mode import Modes
-from pipeline.modes.subtract import separate
-from pipeline.motion.averaged import check_coherence, fit_windows, typical_miss
-from pipeline.motion.by_samples import FEW_WINDOWS, fit_samples
-from pipeline.motion.equation import fit_equation
+from pipeline.motion.at_rest import Rest
 from pipeline.motion.fitted import Fitted
-from pipeline.motion.relaxation import LEAST_DAMPING, Relaxation, find_relaxation
-from pipeline.motion.two_modes import WEAKER, find_two_modes
+from pipeline.motion.kinds import fit_motion
+from pipeline.motion.relaxation import Relaxation
+from pipeline.motion.two_modes import TwoModes
+from pipeline.notice import Notice
 from pipeline.numerics.threads import one_thread
 from pipeline.options import Options
-from pipeline.parts.part import check_sinusoid, find_part, start_of
+from pipeline.parts.part import find_part
 from pipeline.results.derive import derive
 from pipeline.results.effects import tabulate
 from pipeline.samples.condition import Samples, condition
 from pipeline.track import Track
-from pipeline.windows.cycles import NoOscillation
-from pipeline.windows.demodulate import Windows
-from pipeline.windows.rounding import rounded
+from pipeline.windows.cycles import Cycles
 
-__all__ = ["Analysis", "Oscillation", "Relaxation", "Still", "analyse"]
+__all__ = ["Analysis", "Oscillation", "Relaxation", "Rest", "TwoModes", "analyse"]
 
 
 @one_thread
@@ -60,56 +54,30 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
     scene, options = scene or Scene(), options or Options()
     if options.stated is None and scene.damping_law is not None:
         options = replace(options, stated=scene.damping_law)
+    if (ppm := scene.sensor_clock_ppm) is not None:
+        track = replace(track, clock_rate=(1e-6 * ppm.value, 1e-6 * ppm.u))
     if track.unit == "m" and track.sigma_m is None and scene.sensor_sigma_m is not None:
         track = replace(track, sigma_m=scene.sensor_sigma_m.value)
-    samples = condition(track)
-    part = find_part(samples)
-    if isinstance(part, NoOscillation):
-        return without_period(samples, part, scene, options)
-    samples, track = part.samples, part.samples.track
-    if (why := check_sinusoid(samples, part.windows)) is not None:
-        return without_period(samples, why, scene, options)
-    windows, modes = separate(samples, part.cycles, part.windows, sought=options.modes)
-    windows = rounded(windows, samples.quantum)
-    begin, coarse = start_of(samples, windows.angular_frequency), (samples.quantum or 0.0) > COARSE * windows.noise
-    laws = fit_laws(windows, begin, options.laws, options.known_law, track.unit, coarse=coarse)
-
-    # For strong damping, or friction that stops the bob, the equation of motion is fitted, not its cycle average.
-    solved = fit_equation(samples, windows, laws, stopped=part.stopped)
-    fitted = solved if isinstance(solved, Fitted) else _averaged(windows, modes, laws, samples, options)
-    if _may_relax(fitted, laws) and isinstance(relaxed := find_relaxation(samples), Relaxation):
-        return overdamped(samples, relaxed, scene, options)
-    missed = 0.0 if fitted.method == "equation" else typical_miss(fitted)
-    incoherent = check_coherence(fitted, missed)
-    if (incoherent or missed > WEAKER) and (two := find_two_modes(samples)) is not None:
-        return two_modes(samples, two, scene, options)
-    if incoherent is not None:
-        return still(samples, incoherent, scene, options)
-
-    found, misfits = judge(samples, fitted, SensorFilter.of(scene, track.rate_hz), part.lost)
-    effects = tabulate(track, fitted, scene)
+    part = find_part(condition(track))
+    fitted, samples = fit_motion(part, options), part.samples
+    track = samples.track
+    notices, misfits = judge(samples, fitted, SensorFilter.of(scene, track.rate_hz), part.lost)
+    effects = tabulate(track, fitted, scene) if isinstance(fitted, Fitted) else ()
     derived = derive(track, fitted, scene, effects, misfits)
-    windows, swing = fitted.windows, (derived.estimates["offset"].value, fitted.damping.best.joint.values[0])
-    findings = worded(
-        track.unit,
-        # A missing or wrong mass changes the spring constant more than anything that the recording shows.
-        scene_findings(scene, effects, constant="spring_constant" in derived.estimates),
-        part_findings(part.partition, float(track.t[0]), float(track.t[-1])),
-        motion_findings(part.cycles, fitted),
-        damping_findings(fitted.damping),
-        found,
-        sample_findings(
-            samples,
-            windows.flags,
-            windows.noise,
-            find_clusters(track, windows, fitted.phase),
-            swing,
-            by_chance=echoes_by_chance(samples.flags, windows),
-        ),
-        fit_findings(fitted, solved if isinstance(solved, str) else ""),
-        clock_findings(track),
-    )
-    motion = Oscillation.of(fitted, part.cycles, derived)
+    constant = "spring_constant" in derived.estimates
+    left_out = part_findings(part.beginning(fitted.start_s), float(track.t[0]), float(track.t[-1]))
+    motion: Motion
+    shown: tuple[Iterable[Notice], ...]
+    if isinstance(fitted, Fitted):
+        assert isinstance(part.cycles, Cycles)
+        motion = Oscillation.of(fitted, part.cycles, derived)
+        shown = _shown(samples, motion, notices)
+    else:
+        motion = fitted if isinstance(fitted, Rest) else replace(fitted, why=fitted.described(derived.estimates))
+        kind = kind_findings(motion, derived.estimates)
+        shown = (kind, notices, sample_findings(samples, motion.flags, samples.noise))
+    # A missing or wrong mass changes the spring constant more than anything that the recording shows.
+    bench = scene_findings(scene, effects, derived.estimates) if constant or effects else ()
     return Analysis(
         track=track,
         scene=scene,
@@ -117,18 +85,16 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
         samples=samples,
         motion=motion,
         effects=effects,
-        findings=findings,
-        estimates=derived.estimates,
+        findings=worded(track.unit, bench, left_out, *shown, clock_findings(track)),
+        derived=derived,
     )
 
 
-def _averaged(windows: Windows, modes: Modes, laws: Damping, samples: Samples, options: Options) -> Fitted:
-    fitted = fit_windows(windows, modes, laws)
-    by_samples = options.rows == "samples" or windows.t.size < FEW_WINDOWS
-    return fit_samples(fitted, samples) if by_samples else fitted
-
-
-def _may_relax(fitted: Fitted, laws: Damping) -> bool:
-    """Return whether the damping is strong and, if the equation of motion was fitted, linear."""
-    linear = fitted.method != "equation" or fitted.damping.best is fitted.damping.of_powers(1)
-    return linear and laws.best.rate_at_start() / fitted.windows.angular_frequency > LEAST_DAMPING
+def _shown(samples: Samples, motion: Oscillation, notices: tuple[Notice, ...]) -> tuple[Iterable[Notice], ...]:
+    """Return the findings on an oscillation and its samples in groups."""
+    windows, track = motion.windows, samples.track
+    swing = motion.derived.estimates["offset"].value, float(motion.damping.best.joint.values[0])
+    clusters, by_chance = find_clusters(track, windows, motion.phase), echoes_by_chance(samples.flags, windows)
+    of_samples = sample_findings(samples, windows.flags, windows.noise, clusters, swing, by_chance=by_chance)
+    motions = motion_findings(motion.cycles, motion)
+    return motions, damping_findings(motion.damping), notices, of_samples, fit_findings(motion)

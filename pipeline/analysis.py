@@ -12,8 +12,10 @@ from pipeline.bench.scene import Scene
 from pipeline.checks.echoes import count_quality
 from pipeline.errors import AnalysisError
 from pipeline.findings.finding import Finding
+from pipeline.motion.at_rest import Rest
 from pipeline.motion.fitted import Fitted
 from pipeline.motion.relaxation import Relaxation
+from pipeline.motion.two_modes import TwoModes
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.threads import one_thread
 from pipeline.options import Options
@@ -38,22 +40,16 @@ class Oscillation(Fitted):
         return cls(**{each.name: getattr(fitted, each.name) for each in fields(fitted)}, cycles=cycles, derived=derived)
 
 
-@dataclass(frozen=True, slots=True)
-class Still:
-    """A recording without a motion that the stages can fit."""
-
-    why: str  # the reason, one sentence
-
-
-Motion = Oscillation | Relaxation | Still
+Motion = Oscillation | Relaxation | TwoModes | Rest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Analysis:
     """The analysis of one run.
 
-    For an overdamped motion, ``estimates`` contains the relaxation rates. For a still bob it contains only the offset
-    and the noise, and for two overlapping modes their periods and amplitudes as well.
+    Every kind of motion has results with budgets; only an oscillation has laws. For a relaxation they contain the
+    relaxation rates, for two overlapping modes their periods and amplitudes, and for a bob at rest only the offset and
+    the noise.
     """
 
     track: Track
@@ -63,12 +59,17 @@ class Analysis:
     motion: Motion
     effects: tuple[Effect, ...]
     findings: tuple[Finding, ...]  # the most severe first
-    estimates: Mapping[str, Estimate]  # by names in :data:`pipeline.quantities.QUANTITIES`
+    derived: Derived  # estimates and their budgets
 
     @property
     def flags(self) -> U8:
         """The final flags of all samples, (n,) uint8."""
-        return self.motion.windows.flags if isinstance(self.motion, Oscillation) else self.samples.flags
+        return self.motion.flags
+
+    @property
+    def estimates(self) -> Mapping[str, Estimate]:
+        """The estimates by names in :data:`pipeline.quantities.QUANTITIES`."""
+        return self.derived.estimates
 
     @property
     def used(self) -> NDArray[np.bool_]:

@@ -101,6 +101,7 @@ INPUTS: Mapping[str, Input] = {
     "rest_position": Input("scatter of the rest position", "y0", Unit(1)),
     "noise": Input("scatter of the samples", "sigma", Unit(1)),
     "damping_law": Input("scatter of the amplitudes"),
+    "fitted_motion": Input("scatter of the samples about the motion"),
     "local_decay": Input("scatter of the first amplitudes, which no law describes"),
     "choice_of_law": Input("choice among admissible laws"),
     # Inputs from the scene, or properties of the instrument.

@@ -67,6 +67,8 @@ class Track:
     rate_error: float | None = None
     u_rate_error: float | None = None
     clock_limit: float | None = None  # maximum relative rate error of the sensor's clock
+    u_clock: float | None = None  # relative standard uncertainty of the clock's rate, from a bound that was stated
+    clock_rate: tuple[float, float] | None = None  # stated relative rate error of the clock (positive: fast), and its u
     # Samples that came in bursts after a stall, later than jitter explains; the comparison of the clocks excludes them.
     held_samples: int = 0
     longest_stall_s: float = 0.0

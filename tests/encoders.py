@@ -51,6 +51,11 @@ def steps(distance_m: float, step_m: float, lowest: int, highest: int, none: int
     return count if lowest <= count <= highest else none
 
 
+def lidar(count: int) -> bytes:
+    """Return a frame of a TFmini with a strength of 1324 and 25 degC, low bytes first."""
+    return with_sum(b"\x59\x59" + count.to_bytes(2, "little") + bytes.fromhex("2c05180a"))
+
+
 def maxbotix(digits: int, step_m: float, none: int, tail: str = "") -> Callable[[], Encoder]:
     """Return a maker of ``R`` lines."""
     return lambda: Distances(lambda d: f"R{steps(d, step_m, 1, none - 1, none):0{digits}d}{tail}\r".encode())
@@ -100,6 +105,7 @@ ENCODERS: dict[str, Callable[..., Encoder]] = {
     "us100": lambda: Distances(lambda d: steps(d, 1e-3, 20, 4500, 0).to_bytes(2, "big")),
     "urm37": binary(b"\x22", 1e-2, 1, 1000, 0xFFFF),
     "sen0149": binary(bytes([0x55, 0xAA, 0x11, 2, 2]), 1e-3, 1, 12_000, 0xFFFF),
+    "tfmini": lambda unit="cm": Distances(lambda d: lidar(steps(d, LENGTHS_M[unit], 1, 12_000, 0))),
     "text-lines": TextLines,
 }
 

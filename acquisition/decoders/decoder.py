@@ -79,9 +79,14 @@ class Decoder(ABC):
         return False
 
     @property
-    def counts(self) -> bool:
-        """Whether the numbers are those of a clock or a counter, so that there is nothing to record."""
+    def refused(self) -> bool:
+        """Whether what came is not to be recorded as it is: a counter, two sensors in turn, an unlikely unit."""
         return False
+
+    @property
+    def assumed_unit(self) -> str:
+        """Unit that is neither printed nor stated, and with which the distances are read; else empty."""
+        return ""
 
     def unread(self, data: bytes) -> str:
         """Return what bytes look like that gave no reading, and which option of the family would read them."""

@@ -24,10 +24,21 @@ class LineSplitter:
     skip_first : bool
         Whether the first line after the start or after a flush is dropped and counted as ``partial_line``. Reading may
         have begun in the middle of that line, and a part of a number looks like a number.
+    other_ends : tuple of bytes
+        Ends of which one is used instead if three of it come before the first ``end``.
     """
 
-    def __init__(self, end: bytes, limit: int, faults: dict[str, int], *, skip_first: bool = False) -> None:
+    def __init__(
+        self,
+        end: bytes,
+        limit: int,
+        faults: dict[str, int],
+        *,
+        skip_first: bool = False,
+        other_ends: tuple[bytes, ...] = (),
+    ) -> None:
         self._end = end
+        self._other_ends = other_ends
         self._limit = limit
         self.faults = faults
         self._skip_first = skip_first
@@ -44,6 +55,8 @@ class LineSplitter:
         """Return the lines that the bytes complete, without their line ends."""
         if self._held:
             data = self._held + data
+        if self._other_ends:
+            self._choose_end(data)
         lines = data.split(self._end)
         self._held = lines.pop()
         if len(data) <= self._limit and not (self._skip or self._overlong):
@@ -59,6 +72,15 @@ class LineSplitter:
             if len(line) > self._limit:
                 self._drop(line, "bad_frame")
         return [line for line in lines if len(line) <= self._limit]
+
+    def _choose_end(self, data: bytes) -> None:
+        head, end, _ = data.partition(self._end)
+        for other in self._other_ends:
+            if head.count(other) >= 3:
+                self._end, end = other, other
+                break
+        if end or self._overlong:
+            self._other_ends = ()
 
     def flush(self) -> None:
         """Discard the incomplete line."""
@@ -100,9 +122,15 @@ class SumFrames:
     plausible : callable
         Returns whether the sensor can send a frame whose sum is correct. One wrong frame in 256 has a correct eight-bit
         sum, and a constant distance can repeat it forever. This check keeps the decoder from staying misaligned.
+    unsummed : tuple of int
+        Possible numbers of first bytes that the sum leaves out. The first one is assumed until three frames, with no
+        valid one between them, would be valid with another number.
     """
 
-    def __init__(self, size: int, starts: bytes, plausible: Callable[[bytes], bool]) -> None:
+    def __init__(
+        self, size: int, starts: bytes, plausible: Callable[[bytes], bool], unsummed: tuple[int, ...] = (0,)
+    ) -> None:
+        self._unsummed, self._left_out, self._otherwise = unsummed, unsummed[0], 0
         self._size = size
         self._starts = starts
         self._plausible = plausible
@@ -123,7 +151,7 @@ class SumFrames:
         while at <= len(data) - size:
             if data[at] in self._starts:
                 frame = data[at : at + size]
-                if with_sum(frame[:-1]) != frame:
+                if not self._sums_up(frame):
                     faults["bad_checksum"] += 1
                 elif not self._plausible(frame):
                     faults["bad_frame"] += 1
@@ -135,6 +163,19 @@ class SumFrames:
         self._held = data[at:]
         faults["garbage_bytes"] += at - size * len(frames)
         return frames
+
+    def _sums_up(self, frame: bytes) -> bool:
+        """Return whether a frame ends in its sum; learn how many bytes the sum leaves out."""
+        if sum(frame[self._left_out : -1]) & 0xFF == frame[-1]:
+            self._otherwise = 0
+            return True
+        for number in self._unsummed:
+            if sum(frame[number:-1]) & 0xFF == frame[-1] and self._plausible(frame):
+                self._otherwise += 1
+                if self._otherwise == 3:
+                    self._left_out = number
+                    return True
+        return False
 
     def flush(self) -> None:
         """Discard an incomplete frame."""

@@ -25,6 +25,7 @@ _MODULES = {
     "us100": "us100",
     "urm37": "summed",
     "sen0149": "summed",
+    "tfmini": "lidar",
     "text-lines": "text_lines",
 }
 """The module of each family in this package; it has the object FAMILY, or FAMILIES by name."""
@@ -80,9 +81,42 @@ def describe_bytes(data: bytes, unread: Mapping[str, Any] | None = None) -> str:
         return "looks like " + " or ".join(f"{get_family(name).title} [{name}]" for name in names)
     if len(set(data)) == 1:
         return f"{len(data)} bytes, all 0x{data[0]:02X}: a line held at one level, or the wrong baud rate?"
-    if b"\n" in data and sum(byte in b"\t\r\n" or 32 <= byte < 127 for byte in data) >= 0.9 * len(data):
+    if is_text(data) and any(end in data for end in (b"\n", b"\r", b"*/")):
         return get_family("text-lines").decoder(**(unread or {})).unread(data)
+    if is_text(data):
+        return (
+            f"looks like text without line ends ({data[:40].decode('ascii', 'replace')!r}): let the sketch use println"
+        )
+    low = bytes(byte & 0x7F for byte in data)
+    if is_text(low) and b"\n" in low:
+        odd = sum(byte.bit_count() % 2 for byte in data) / len(data)
+        form = "7E1" if odd < 0.02 else "7O1" if odd > 0.98 else "7M1" if min(data) > 127 else ""
+        if form:
+            return f"looks like text lines of 7 data bits and a parity: add --framing {form}"
+    if (size := _frame_size(data)) is not None:
+        return f"looks like frames of {size} bytes of an unknown sensor"
     return "looks like noise: wrong baud rate, or inverted polarity (RS-232 levels on a TTL adapter)?"
+
+
+def is_text(data: bytes) -> bool:
+    """Return whether nearly all bytes are printable characters, line ends and colours of a terminal."""
+    return sum(byte in b"\t\r\n\x1b" or 32 <= byte < 127 for byte in data) >= 0.9 * len(data)
+
+
+def _frame_size(data: bytes) -> int | None:
+    """Return the distance after which one byte repeats in nearly all frames of at most 32 bytes; None if none does.
+
+    In noise each of 256 values has the probability 1/256, so ten frames in which one is the same nine times are none.
+    """
+    for size in range(3, 33):
+        columns = [data[at::size] for at in range(size)]
+        if len(data) >= 10 * size and any(map(_constant, columns)):
+            return size
+    return None
+
+
+def _constant(column: bytes) -> bool:
+    return max(map(column.count, set(column))) >= 0.9 * len(column)
 
 
 def _share(family: Sensor, data: bytes) -> float:

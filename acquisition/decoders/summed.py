@@ -2,7 +2,7 @@
 
 - FF H L SUM is sent without requests by modules of many names (A02YYUW, ME007YS, A01NYUB, DYP-A01/A02/ME007, JSN-SR04T
   in serial mode): ``FF 07 A1 A7`` is 1953 mm. The value 0 means no target, as do the codes FFFD (no target in range)
-  and FFFE (disturbed by another sensor) of the newer DYP modules.
+  and FFFE (disturbed by another sensor) of the newer DYP modules. The sum of some JSN-SR04T and AJ-SR04M leaves FF out.
 - URM37 (SEN0001) is polled: the request ``22 00 00 22`` returns the distance in cm, ``22 H L SUM``.
 - SEN0149 and SEN0150 (URM06, RS-485, UART) are polled with frames ``55 AA address length command H L SUM``: the reply
   ``55 AA 11 02 02 12 34 5A`` is 4660 mm.
@@ -39,6 +39,7 @@ class FrameForm(NamedTuple):
     temperature: int = -1
     signs: Sequence[int] = range(16)
     fixed: tuple[tuple[int, int], ...] = ()
+    unsummed: tuple[int, ...] = (0,)
 
 
 class SummedDecoder(FramedDecoder):
@@ -46,7 +47,7 @@ class SummedDecoder(FramedDecoder):
 
     def __init__(self, form: FrameForm, temperature_every: int = 0) -> None:
         self._form = form
-        super().__init__(SumFrames(form.size, form.starts, self._plausible))
+        super().__init__(SumFrames(form.size, form.starts, self._plausible, form.unsummed))
 
     def _plausible(self, frame: bytes) -> bool:
         form, value = self._form, frame[-3] << 8 | frame[-2]
@@ -65,7 +66,7 @@ class SummedDecoder(FramedDecoder):
 
 
 # The largest value is beyond the range of every module, but its high byte is none that begins a frame.
-_FFHLS = FrameForm(4, b"\xff", 1e-3, 10_000, (0xFFFD, 0xFFFE))
+_FFHLS = FrameForm(4, b"\xff", 1e-3, 10_000, (0xFFFD, 0xFFFE), unsummed=(0, 1))
 # A temperature has twelve bits, and its upper four are all 1 below zero.
 _URM37 = FrameForm(4, b"\x22\x11", 1e-2, 1000, (0xFFFF,), distance=0x22, temperature=0x11, signs=(0x0, 0xF))
 # The address, the third byte, may have any value.
@@ -76,7 +77,7 @@ FAMILIES = {
     for family in (
         Sensor(
             name="ffhls",
-            title="FF-H-L-SUM frames (A02YYUW, ME007YS, A01NYUB, DYP modules, JSN-SR04T in serial mode)",
+            title="FF-H-L-SUM frames (A02YYUW, ME007YS, A01NYUB, DYP modules, JSN-SR04T, AJ-SR04M in serial mode)",
             baud=9600,
             rate_hz=10.0,
             resolution_m=_FFHLS.unit_m,

@@ -8,7 +8,10 @@ counted as ``bad_frame``.
 
 from __future__ import annotations
 
+import contextlib
+import math
 import re
+from collections import Counter
 from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any
@@ -16,7 +19,16 @@ from typing import Any
 from acquisition.decoders.frames import FramedDecoder, LineSplitter
 from acquisition.decoders.sensor import Sensor
 from acquisition.errors import SensorError
-from acquisition.line_numbers import LENGTHS_M, TIMES_US, Number, find_distance, has_decimal_comma, numbers
+from acquisition.line_numbers import (
+    LENGTHS_M,
+    TIMES_US,
+    UPTIME,
+    Number,
+    find_distance,
+    has_decimal_comma,
+    numbers,
+    uncoloured,
+)
 from acquisition.readings import NAN, Reading
 
 LONGEST_TEXT_LINE = 256  # maximum length of a line, bytes
@@ -29,6 +41,10 @@ _ECHO_M_PER_US = 172e-6
 # So many steps in a row of a lone number, equal to this share, are those of a counter, or suspect at the beginning.
 _COUNTS, _EVEN, _SUSPECT = 50, 0.02, 12
 _NAME = re.compile(r"[A-Za-z_][\w .-]{0,31}", re.ASCII)
+OTHER_ENDS = (b"\r", b"*/")  # a carriage return alone, and the end of a frame of Serial Studio
+_NOTED = 1000  # number of first distances that may raise a question
+_WORDS = re.compile("[\x80-\xff]+")
+_BESIDE_DIGIT = re.compile("[\x80-\xff][0-9.+-]|[0-9.+-][\x80-\xff]|(?<![\x80-\xff])[\x80-\xff](?![\x80-\xff])")
 _NO_TARGET = re.compile(
     r"out of range|fuera de|fora d[eo]|au(?:ß|ss)er|hors de|no (?:echo|target)|kein (?:echo|ziel)|timed? ?out",
     re.IGNORECASE,
@@ -59,10 +75,10 @@ class TextLinesDecoder(FramedDecoder):
         temperature: int | str | None = None,
     ) -> None:
         faults = {"garbage_bytes": 0, "bad_frame": 0, "partial_line": 0, "blank_line": 0}
-        super().__init__(LineSplitter(b"\n", LONGEST_TEXT_LINE, faults, skip_first=True))
+        super().__init__(LineSplitter(b"\n", LONGEST_TEXT_LINE, faults, skip_first=True, other_ends=OTHER_ENDS))
         _demand("unit", unit, {**LENGTHS_M, "us": 1.0})
         _demand("time_unit", time_unit, TIMES_US)
-        self._unit, self._time_unit = unit or "", time_unit
+        self._unit, self._clock = unit or "", _PrintedClock(time_unit)
         self._separator = _separator(separator)
         self._column = None if column == "auto" else _place("column", column)
         self._sequence, self._time, self._temperature = (
@@ -71,6 +87,8 @@ class TextLinesDecoder(FramedDecoder):
         )
         self._last = self._step = 0.0
         self._steps = 0
+        self._names: Counter[tuple[str, str]] = Counter()  # words before the distances, each with its unit
+        self._largest = self._smallest = math.nan  # of the distances without a unit
 
     def reading(self, host_ns: int, frame: bytes) -> Reading | None:
         """Return the reading of a line, or None; count the fault of a line without a reading."""
@@ -85,7 +103,10 @@ class TextLinesDecoder(FramedDecoder):
         number = None if silent else self._distance(line)
         silent = silent and self.resolution_m is not None
         sequence = _whole(self._sequence, line, 1.0)
-        device_us = _whole(self._time, line, None if self._time_unit is None else TIMES_US[self._time_unit])
+        where: str | int | None = self._time
+        if where is None and text.startswith(UPTIME):
+            where = UPTIME[:-1]
+        device_us = self._clock.read(where, line)
         if sequence is None or device_us is None or (number is None and not silent):
             self._count("bad_frame", len(frame) + 1)
             return None
@@ -93,6 +114,7 @@ class TextLinesDecoder(FramedDecoder):
         warm = celsius.value if celsius is not None and celsius.unit in ("C", "") else NAN
         echo_us = distance_m = NAN
         if number is not None and not self._is_counter(number):
+            self._note(number)
             unit = number.unit or self._unit or "cm"
             scale = 1.0 if unit == "us" else LENGTHS_M[unit]
             scaled = number.value * scale
@@ -105,18 +127,55 @@ class TextLinesDecoder(FramedDecoder):
 
     @property
     def undecided(self) -> bool:
-        """Whether the numbers so far may still be those of a counter."""
-        return 1 < self._steps <= _SUSPECT
+        """Whether the numbers so far may still be those of a counter or of several sensors."""
+        return 1 < self._steps <= _SUSPECT or (len(self._names) > 1 and self._names.total() < _SUSPECT)
 
     @property
-    def counts(self) -> bool:
-        """Whether the numbers count evenly, as no distance does for long."""
-        return self._steps > _SUSPECT
+    def refused(self) -> bool:
+        """Whether the numbers count evenly, as no distance does for long, are of several sensors, or are metres."""
+        return self._steps > _SUSPECT or bool(self._in_turn) or self._may_be_metres
+
+    @property
+    def assumed_unit(self) -> str:
+        """``cm`` if no unit was printed or stated."""
+        return "cm" if self._largest == self._largest else ""
+
+    def _note(self, number: Number) -> None:
+        """Note the words before a distance and its size, from which a question may follow."""
+        if self._names.total() < _NOTED:
+            if self._column is None:
+                self._names[" ".join(number.before.split()).strip(" :=>").strip(), number.unit] += 1
+            if not (number.unit or self._unit):
+                self._largest = max(number.value, self._largest) if self._largest == self._largest else number.value
+                self._smallest = min(number.value, self._smallest) if self._smallest == self._smallest else number.value
+
+    @property
+    def _in_turn(self) -> list[str]:
+        """Names of which each is before at least a quarter of the distances of one unit; empty if it is one name."""
+        total = self._names.total()
+        often = [key for key, count in self._names.items() if key[0] and count >= max(3, total // 4)]
+        named = [name for name, unit in often if sum(unit == each for _, each in often) > 1]
+        return sorted(named) if total >= _SUSPECT else []
+
+    @property
+    def _may_be_metres(self) -> bool:
+        """Whether numbers without a unit would be nearer than any sensor of this kind measures, if they were cm."""
+        return self._smallest > 0.0 and self._largest < 100.0 * FAMILY.range_m[0]
 
     def unread(self, data: bytes) -> str:
         """Return what the lines look like that gave no reading, and which option would read them."""
-        lines = [line.strip() for line in data.rpartition(b"\n")[0].decode("utf-8", "replace").splitlines()[1:]]
-        lines = [line for line in lines if line]
+        self.feed(0, data)
+        if self._in_turn:
+            names = ", ".join(self._in_turn)
+            column = _column_name(self._in_turn[0])
+            return f"looks like lines of several sensors in turn ({names}): state one, as in --option column={column}"
+        if self._may_be_metres:
+            span = f"{self._smallest:g} to {self._largest:g}"
+            return (
+                f"looks like distances without a unit ({span}), too short for cm: add --option unit=m, or the true unit"
+            )
+        splitter = LineSplitter(b"\n", LONGEST_TEXT_LINE, {"garbage_bytes": 0, "bad_frame": 0}, other_ends=OTHER_ENDS)
+        lines = [text for line in splitter.split(data)[1:] if (text := _text(line))]
         distance_lines = [line for line in map(self._found, lines) if not all(number.is_other for number in line[1])]
         if not distance_lines:
             return f"looks like text lines without a distance ({(lines or [''])[0][:40]!r})"
@@ -179,11 +238,17 @@ class TextLinesDecoder(FramedDecoder):
 def _text(line: bytes) -> str:
     """Return the text of a line, empty if it is noise, which may have digits too."""
     try:
-        text = line.decode().strip()
+        text = uncoloured(line.decode().strip())
     except UnicodeDecodeError:
         text = line.decode("latin-1").strip()
         if sum(letter > "~" for letter in text) > 2:
-            return ""
+            # Noise, and text with a parity bit, have such bytes singly or next to digits, and words in runs.
+            if min(len(word) for word in _WORDS.findall(text)) >= 4:
+                with contextlib.suppress(UnicodeDecodeError):
+                    text = line.decode("gb2312").strip()
+            text = text if not _WORDS.search(text) or _BESIDE_DIGIT.search(text) else _WORDS.sub("\u25a1", text)
+            if _WORDS.search(text):
+                return ""
     return text if text.replace("\t", " ").isprintable() else ""
 
 
@@ -200,6 +265,11 @@ def _at(where: int | str, line: FoundNumber) -> Number | None:
     return named[0] if len(named) == 1 else None
 
 
+def _column_name(words: str) -> str:
+    """Return a name that :func:`_at` finds, quoted for a shell if it has blanks."""
+    return f'"{words}"' if " " in words else words
+
+
 def _cell(number: Number, cells: list[tuple[int, int]]) -> int:
     return next(index for index, (begin, end) in enumerate(cells) if begin <= number.start <= end)
 
@@ -211,18 +281,47 @@ def _counts(cell: int, lines: list[FoundNumber]) -> bool:
     return len(steps) >= 4 and min(steps) > 0 and sorted(steps)[3 * len(steps) // 4] <= 1.5 * min(steps)
 
 
-def _whole(where: int | str | None, line: FoundNumber, scale: float | None) -> int | None:
-    """Return the scaled whole number in a column; -1 without a column, None without a valid number of at least 0.
-
-    Without a scale, the number is a time in the unit printed with it, else in microseconds.
-    """
+def _whole(where: int | str | None, line: FoundNumber, scale: float) -> int | None:
+    """Return the scaled whole number in a column; -1 without a column, None without a valid number of at least 0."""
     if where is None:
         return -1
     number = _at(where, line)
-    if number is None:
-        return None
-    scaled = number.value * (TIMES_US.get(number.unit, 1.0) if scale is None else scale)
+    scaled = -1.0 if number is None else number.value * scale
     return round(scaled) if 0 <= scaled < 2**63 else None
+
+
+class _PrintedClock:
+    """Reads a printed time, which may go on from its largest to its smallest number of 16 or 32 bits, also below 0."""
+
+    def __init__(self, unit: str | None) -> None:
+        self._unit = unit
+        self._last = self._step = self._turns = 0.0
+        self._first = True
+
+    def read(self, where: int | str | None, line: FoundNumber) -> int | None:
+        """Return the time in a column, us; -1 without a column, None without a time."""
+        if where is None:
+            return -1
+        number = _at(where, line)
+        if number is None:
+            return None
+        scale = TIMES_US[self._unit] if self._unit else TIMES_US.get(number.unit, 1.0)
+        value, step = number.value, number.value - self._last
+        if self._first:
+            self._first, step = False, 0.0
+            if value < 0:
+                self._turns = 2.0**16 if value >= -(2.0**15) else 2.0**32
+        for turn in (2.0**16, 2.0**32):
+            # Time goes on over a turn by about the step before; a board that restarts begins anywhere near 0.
+            if step < -0.5 * turn and 0.0 < step + turn <= max(20.0 * self._step, 1e6 / scale) and self._at_end(turn):
+                self._turns, step = self._turns + turn, step + turn
+        self._last, self._step = value, step if step > 0.0 else self._step
+        scaled = (value + self._turns) * scale
+        return round(scaled) if 0 <= scaled < 2**63 else None
+
+    def _at_end(self, turn: float) -> bool:
+        near = 0.05 * turn
+        return min(abs(self._last - 0.5 * turn), abs(self._last - turn)) <= near
 
 
 def _place(option: str, where: int | str) -> int | str:

@@ -176,6 +176,7 @@ class SensorChain:
             "gaps": [asdict(gap) for gap in self.timebase.gaps],
             **({"gaps_left_out": dict(left_out)} if left_out["count"] else {}),
             "restarts": self.timebase.restarts,
+            "restart_silences_s": list(self.timebase.restart_silences_s),
             "clock": {
                 "kind": self.timebase.clock,
                 "moment": "reflection" if self._at_reflection else "reading",

@@ -197,6 +197,8 @@ def _support_of_echo(even: _Even, at: F8, longer: F8, t: F8) -> float:
     """Return by how much reads that are late in step with the echoes support these, as -2 log likelihood."""
     known = np.column_stack([np.ones(at.size), at, np.interp(at, t, longer)])
     late = np.minimum(even.late, np.quantile(even.late, 0.9))  # a stalled link says nothing
+    if not np.ptp(late) > 0.0:
+        return 0.0  # every read came as early as the others, as a virtual clock has it
     weights, *_ = np.linalg.lstsq(known, late, rcond=None)
     residual, share = late - known @ weights, float(weights[2])
     u2 = float(residual @ residual) / (at.size - 3) * float(np.linalg.inv(known.T @ known)[2, 2])
@@ -262,7 +264,8 @@ class _Even(NamedTuple):
 
 def _all_arrived(reads: Reads, at: F8) -> bool:
     """Return whether no line was lost: the earliest arrivals of all stretches then lie on one line over their count."""
-    late, parts = at - at[-1] / reads.last[-1] * reads.last, np.array_split(np.arange(at.size), STRETCHES)
+    stretches = max(3, min(STRETCHES, at.size // 8))
+    late, parts = at - at[-1] / reads.last[-1] * reads.last, np.array_split(np.arange(at.size), stretches)
     earliest = np.array([rows[np.argmin(late[rows])] for rows in parts])
     x = reads.last[earliest]
     for _ in range(3):  # the minima are those relative to the line

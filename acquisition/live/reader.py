@@ -14,12 +14,14 @@ from typing import Protocol
 from acquisition.clock import Clock
 from acquisition.decoders.sensor import Poll
 from acquisition.errors import PortError
-from acquisition.events import Event, Lost, Reopened, TimedOut
+from acquisition.events import Event, Lost, Reopened, Shared, TimedOut
 from acquisition.live.serial_port import SerialPort
 from acquisition.readings import Read
 
 REOPEN_EVERY_S = 0.5
 WAIT_S = 0.25
+SHARED_EVERY_NS = 10_000_000_000
+"""Minimum time between two reports that another program reads a port, ns."""
 POLLED_WAIT_S = 0.01
 """Maximum wait for bytes of a polled sensor, s, so that the next request is not late."""
 
@@ -103,7 +105,7 @@ class PortReader:
     def _read_until_lost(self, line: PortLine) -> str | None:
         """Pass on what a port sends until it is lost; return the reason, or None at the end."""
         asker = None if line.poll is None else _Asker(line, line.poll)
-        wait_s = WAIT_S if asker is None else POLLED_WAIT_S
+        wait_s, shared_ns = WAIT_S if asker is None else POLLED_WAIT_S, -SHARED_EVERY_NS
         while not self._stop.is_set():
             try:
                 if asker is not None and asker.ask(now_ns := self._clock.now_ns()):
@@ -111,6 +113,9 @@ class PortReader:
                 data = line.port.read(wait_s)
             except PortError as error:
                 return str(error)
+            if line.port.shared and (now_ns := self._clock.now_ns()) - shared_ns >= SHARED_EVERY_NS:
+                shared_ns, line.port.shared = now_ns, False
+                self._sink.event(line.channel, now_ns, Shared(port=line.port.name))
             if data:
                 now_ns = self._clock.now_ns()
                 if asker is not None:

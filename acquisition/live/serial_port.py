@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import re
 import select
 import socket
 import stat
@@ -24,6 +25,9 @@ except ImportError:  # on Windows, where the use of a port is always exclusive
     _TERMIOS_ERRORS = ()
 
 READ_BYTES = 65536
+EMPTY_READS = 3
+"""Number of reads without a byte, though some were announced, that show another reader."""
+SEVEN_BITS = bytes(byte & 0x7F for byte in range(256))
 KEEPALIVE_S = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 2, "TCP_KEEPCNT": 3}
 """A silently lost connection is closed after five seconds without data and three probes, two seconds apart."""
 OTHER_TRIES = 10
@@ -45,9 +49,17 @@ class SerialPort:
     use it.
     """
 
-    def __init__(self, address: str, baud: int) -> None:
+    def __init__(self, address: str, baud: int, framing: str = "8N1") -> None:
         self.name = address
+        self._empty_reads = 0
+        self.shared = False  # whether another program took bytes since a reader set this to False
         self._baud = baud
+        self._framing = framing
+        if re.fullmatch("[5-8][NEOMS][12]", framing) is None:
+            raise PortError(
+                f"{address}: a framing is data bits, parity (N, E, O, M, S) and stop bits, got {framing!r}",
+                "state it as in 7E1",
+            )
         self._port: Any = None
         self._descriptor = -1
         self._others = 0  # number of consecutive tries that found another device
@@ -94,8 +106,12 @@ class SerialPort:
         try:
             # The network ports of pyserial support neither a write timeout (RFC 2217 refuses it) nor exclusive use.
             options: dict[str, Any] = {} if "://" in address else {"exclusive": True, "write_timeout": 1.0}
+            data_bits, parity, stop_bits = tuple(self._framing)
+            if self._with_parity:  # on the line, seven bits and a parity are eight bits
+                data_bits, parity = "8", "N"
+            options |= {"bytesize": int(data_bits), "parity": parity, "stopbits": int(stop_bits)}
             port = serial.serial_for_url(address, baudrate=self._baud, timeout=0, **options)
-        except (serial.SerialException, OSError, ValueError, NotImplementedError) as error:
+        except (serial.SerialException, OSError, ValueError, NotImplementedError, *_TERMIOS_ERRORS) as error:
             raise PortError(f"{self.name}: cannot be opened ({error})") from error
         self._port = port
         self._descriptor = _descriptor(port)
@@ -104,6 +120,15 @@ class SerialPort:
 
     def read(self, wait_s: float) -> bytes:
         """Return available bytes, or wait up to ``wait_s`` for some; a PortError means that the port was lost."""
+        data = self._read(wait_s)
+        return data.translate(SEVEN_BITS) if self._with_parity else data
+
+    @property
+    def _with_parity(self) -> bool:
+        """Whether seven data bits come with a parity bit above them."""
+        return self._framing[0] == "7" and self._framing[1] != "N"
+
+    def _read(self, wait_s: float) -> bytes:
         with self._as_port_error("the port was disconnected"):
             if self._descriptor < 0:  # RFC 2217, Windows
                 if self._port.timeout != wait_s:  # setting the timeout makes RFC 2217 renegotiate all port settings
@@ -112,12 +137,17 @@ class SerialPort:
                 return bytes(data + self._port.read(min(self._port.in_waiting, READ_BYTES))) if data else b""
             if not select.select([self._descriptor], [], [], wait_s)[0]:
                 return b""
+            terminal, data = os.isatty(self._descriptor), b""
             try:
                 data = os.read(self._descriptor, READ_BYTES)
             except BlockingIOError:
-                return b""
-            if not data:
+                if not terminal:
+                    return b""
+            if not data and (not terminal or _hung_up(self._descriptor)):
                 raise OSError("end of file")
+            if not data:  # a terminal had bytes, and another program was faster, or select was wrong, which is rare
+                self._empty_reads += 1
+                self.shared |= self._empty_reads >= EMPTY_READS
             return data
 
     def write(self, data: bytes) -> None:
@@ -170,6 +200,15 @@ def _devices() -> dict[str, _Device]:
         for port in list_ports()
         if port.vid is not None
     }
+
+
+def _hung_up(descriptor: int) -> bool:
+    """Return whether the device of a terminal is gone."""
+    if not hasattr(select, "poll"):
+        return True
+    poll = select.poll()
+    poll.register(descriptor, select.POLLIN)
+    return any(event & (select.POLLHUP | select.POLLERR | select.POLLNVAL) for _, event in poll.poll(0))
 
 
 def _ask_terminal(descriptor: int, request: str) -> None:

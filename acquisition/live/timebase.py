@@ -7,6 +7,7 @@ times. Lines without a clock have the times that :mod:`acquisition.live.line_tim
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 
 from acquisition.block import ClockKind, Flag
@@ -61,6 +62,8 @@ class Timebase:
         self.gaps: list[Gap] = []
         self.gaps_left_out = {"count": 0, "lost": 0, "longest_s": 0.0}  # summary of the gaps after the first KEPT_GAPS
         self.restarts = 0
+        self.restart_silences_s: list[float] = []
+        self._delays_s: deque[float] = deque(maxlen=100)  # of the latest readings, by the host's clock
         self._count = 0
         self._last_raw: int | None = None
         self._last_host_ns = 0
@@ -94,6 +97,7 @@ class Timebase:
             flag = int(Flag.GAP_BEFORE)
             self.note_gap(self._count, step_s, self.rate_hz)
         self._latest_s = max(self._latest_s, t)
+        self._delays_s.append(reading.host_ns * NANO - t)
         self._count += 1
         return t, flag
 
@@ -129,7 +133,11 @@ class Timebase:
                 difference += wraps * WRAP_US
             elif step < -1.0 or (step > self._jitter_s and raw * unit_s < elapsed - 2.0):
                 self.restarts += 1
-                self._anchor_s, self._ticks = self._latest_s + max(elapsed, self._period_s), 0
+                # The reading before may have come late, but not the earliest of many.
+                now_s = host_ns * NANO - min(self._delays_s)
+                self._anchor_s, self._ticks = max(now_s, self._latest_s + self._period_s), 0
+                if len(self.restart_silences_s) < KEPT_GAPS:
+                    self.restart_silences_s.append(self._anchor_s - self._latest_s)
                 return True
         self._ticks += difference
         return False

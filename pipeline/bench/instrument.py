@@ -38,6 +38,8 @@ class Instrument:
     def of(cls, track: Track) -> Instrument:
         """Return the clock and scale that a track states for its sensor.
 
+        A rate that the scene states replaces everything else, and a stated bound B the crystal's, with u = B/sqrt(3).
+
         A comparison of the sensor's clock with the host's gives their difference but not which of them is right. So it
         changes nothing as long as both can meet their specifications. Beyond three standard uncertainties the host is
         the reference (a ceramic resonator is off by thousands of ppm): frequencies are multiplied by 1 + r, and the
@@ -76,10 +78,17 @@ class Instrument:
 
 def _rate(track: Track) -> tuple[Estimate, str, bool]:
     """Return the factor on every frequency, its origin, and whether the comparison of the clocks was rejected."""
-    spec = f"a crystal's {U_CRYSTAL * 1e6:.0f} ppm"
+    if track.clock_rate is not None:
+        fast, u_fast = track.clock_rate
+        words = (
+            f"the scene states {fast * 1e6:+.4g} ppm for the clock (u {u_fast * 1e6:.2g}): frequencies are corrected"
+        )
+        return Estimate(1.0 + fast, math.hypot(u_fast, track.u_rate)), words, False
+    own = U_CRYSTAL if track.u_clock is None else track.u_clock
+    spec = f"a crystal's {U_CRYSTAL * 1e6:.0f} ppm" if track.u_clock is None else f"the stated {own * 1e6:.2g} ppm"
     limit = math.inf if track.clock_limit is None else track.clock_limit + HOST_LIMIT
     if track.rate_error is None:
-        return _uncompared(track, limit, spec)
+        return _uncompared(track, limit, own, spec)
     rate, u = track.rate_error, track.u_rate_error
     if u is None or not (math.isfinite(rate) and math.isfinite(u) and u >= 0):
         raise TrackError(
@@ -105,7 +114,7 @@ def _rate(track: Track) -> tuple[Estimate, str, bool]:
             return _uncorrected(rate), words, False
         words = f"{text}, more than two crystals can differ: frequencies are corrected to the host's"
         return Estimate(1.0 + rate, (1.0 + rate) * math.hypot(u, U_CRYSTAL)), words, False
-    found = Estimate(1.0, U_CRYSTAL)
+    found = Estimate(1.0, own)
     if track.held_samples:
         found = _uncorrected(min(math.sqrt(3.0) * u, limit, 1.0))
         spec = f"{found.u * 1e6:.0f} ppm"
@@ -117,7 +126,7 @@ def _uncorrected(half: float) -> Estimate:
     return Estimate(1.0, math.hypot(U_CRYSTAL, half / math.sqrt(3.0)))
 
 
-def _uncompared(track: Track, limit: float, spec: str) -> tuple[Estimate, str, bool]:
+def _uncompared(track: Track, limit: float, own: float, spec: str) -> tuple[Estimate, str, bool]:
     """Return factor, origin and rejection for a clock without a comparison; delays may have prevented one."""
     if track.clock == "device" and track.held_samples:
         half = min(limit, 1.0)
@@ -130,9 +139,6 @@ def _uncompared(track: Track, limit: float, spec: str) -> tuple[Estimate, str, b
     source = {"nominal": "are row numbers over the nominal rate", "host": "are the host's"}
     times = source.get(track.clock, "were measured by the device")
     if track.u_rate:
-        times, spec = (
-            "follow from arrivals",
-            f"a crystal's {U_CRYSTAL * 1e6:.0f} and their {track.u_rate * 1e6:.2g} ppm",
-        )
-    rate = Estimate(1.0, math.hypot(U_CRYSTAL, track.u_rate))
+        times, spec = "follow from arrivals", f"{spec.removesuffix(' ppm')} and their {track.u_rate * 1e6:.2g} ppm"
+    rate = Estimate(1.0, math.hypot(own, track.u_rate))
     return rate, f"times {times}: {spec} stand in every frequency's uncertainty", False

@@ -9,13 +9,13 @@ from typing import Any, Generic, TypeVar
 
 from pipeline.bench.air import saturation_pressure
 from pipeline.bench.law_names import law_names
+from pipeline.bench.typed import typed
 from pipeline.errors import SceneError
 from pipeline.numerics.estimate import Estimate
 
 TakenT = TypeVar("TakenT")
 KeptT = TypeVar("KeptT")
 POSITIONS = ("below", "above")
-USUAL_BOB_KG = (1e-3, 20.0)  # a bob of a bench; a mass beyond is probably in grams
 
 
 class _Field(Generic[TakenT, KeptT]):
@@ -37,7 +37,7 @@ class _Field(Generic[TakenT, KeptT]):
         raise NotImplementedError
 
 
-class Stated(_Field[Estimate | float | tuple[float, float], Estimate]):
+class Stated(_Field[Estimate | float | str | tuple[float, float], Estimate]):
     """A quantity of a scene: its table and key in a scene file, its unit, and its allowed range, including both ends.
 
     The ends lie far beyond any bench. The calculations are known to be valid between them, so every allowed value gives
@@ -55,7 +55,7 @@ class Stated(_Field[Estimate | float | tuple[float, float], Estimate]):
         return f"at least {self.least:g}{unit} and at most {self.greatest:g}"
 
     def checked(self, given: Any, where: str) -> Estimate:
-        """Return a number, a pair (value, u), a table of the two or an estimate as an estimate."""
+        """Return the estimate of a number, of a text with its unit, of a pair (value, u), or of a table of the two."""
         table, key = self.place
         name = f"{where}: [{table}] {key}"
         value, u, unit = given, 0.0, ""
@@ -63,6 +63,12 @@ class Stated(_Field[Estimate | float | tuple[float, float], Estimate]):
             if "value" not in given or set(given) - {"value", "u"}:
                 raise SceneError(f"{name} must be a number or {{ value = ..., u = ... }}, got {_short(dict(given))}")
             value, u = given["value"], given.get("u", 0.0)
+        elif isinstance(given, str):
+            try:
+                given = typed(given, self.unit)
+            except ValueError as error:
+                raise SceneError(f"{name} {error}, got {_short(given)}") from error
+            value, u = given.value, given.u
         elif isinstance(given, tuple) and len(given) == 2:  # as in Scene(bob_mass_kg=(0.2, 0.0001))
             value, u = given
         elif hasattr(given, "nominal_value"):  # an estimate, or a number of the uncertainties package
@@ -116,6 +122,7 @@ class Scene:
     sensor_position: Choice = Choice("sensor", "position", lambda: POSITIONS)
     sensor_mean_samples: Stated = Stated("sensor", "mean_samples", "", 1.0, 1e4)
     sensor_lag_s: Stated = Stated("sensor", "lag_s", "s", 0.0, 1e3)
+    sensor_clock_ppm: Stated = Stated("sensor", "clock_ppm", "ppm", -1e5, 1e5)
     start_displacement_m: Stated = Stated("start", "displacement_m", "m", -1e3, 1e3)
     start_velocity_m_per_s: Stated = Stated("start", "velocity_m_per_s", "m/s", -1e6, 1e6)
     gamma_per_s: Stated = Stated("damping", "gamma_per_s", "1/s", 0.0, 1e6)
@@ -132,9 +139,9 @@ class Scene:
         """
         known: dict[str, Any] = {}
         for table, content in tables.items():
-            allowed = [key for name, key in (*_QUANTITIES, *_CHOICES) if name == table]
+            allowed = [key for name, key in (*BENCH_KEYS, *_CHOICES) if name == table]
             if not allowed:
-                names = ", ".join(dict.fromkeys(name for name, _ in _QUANTITIES))
+                names = ", ".join(dict.fromkeys(name for name, _ in BENCH_KEYS))
                 raise SceneError(f"{where}: unknown table [{_short(table)[1:-1]}]", f"allowed are {names}")
             if not isinstance(content, Mapping):
                 raise SceneError(
@@ -146,7 +153,7 @@ class Scene:
                         f"{where}: unknown key {_short(key)} in [{table}] (value {_short(value)})",
                         f"allowed are {', '.join(allowed)}",
                     )
-                field: _Field[Any, Any] = _QUANTITIES.get((table, key)) or _CHOICES[table, key]
+                field: _Field[Any, Any] = BENCH_KEYS.get((table, key)) or _CHOICES[table, key]
                 known[field.attribute] = field.checked(value, where)
         scene = cls(**known)
         _check_vapour(scene, where)
@@ -155,7 +162,7 @@ class Scene:
     def to_mapping(self) -> dict[str, dict[str, Any]]:
         """Return the tables without unknown quantities; the inverse of :meth:`from_mapping`."""
         tables: dict[str, dict[str, Any]] = {}
-        for (table, key), quantity in _QUANTITIES.items():
+        for (table, key), quantity in BENCH_KEYS.items():
             estimate: Estimate | None = getattr(self, quantity.attribute)
             if estimate is not None:
                 plain = estimate.u == 0
@@ -167,19 +174,6 @@ class Scene:
                 tables.setdefault(table, {})[key] = text
         return tables
 
-    def unusual(self) -> tuple[tuple[str, str], ...]:
-        """Return a clause with "?" or "" after it for an implausible bob, and for values within their uncertainties."""
-        clauses: list[tuple[str, str]] = []
-        if (bob := self.bob_mass_kg) is not None and not USUAL_BOB_KG[0] <= bob.value <= USUAL_BOB_KG[1]:
-            usual = f"{USUAL_BOB_KG[0]:g} to {USUAL_BOB_KG[1]:g} kg"
-            clauses.append((f"[bob] mass_kg = {bob.value:g} is beyond {usual}: did you mean grams", "?"))
-        for (table, key), q in _QUANTITIES.items():
-            found: Estimate | None = getattr(self, q.attribute)
-            if found is not None and q.least > 0.0 and found.u >= found.value:
-                wide = f"[{table}] {key} = {found.value:g} has an uncertainty as large as the value, u = {found.u:g}"
-                clauses.append((wide, ""))
-        return tuple(clauses)
-
     @property
     def tells_of_sensor(self) -> bool:
         """Whether the scene describes a rangefinder under [sensor], and not only a noise, which all distances have."""
@@ -187,9 +181,9 @@ class Scene:
         return any(x is not None for x in given)
 
 
-_QUANTITIES = {each.place: each for each in vars(Scene).values() if isinstance(each, Stated)}
+BENCH_KEYS = {each.place: each for each in vars(Scene).values() if isinstance(each, Stated)}
 _CHOICES = {each.place: each for each in vars(Scene).values() if isinstance(each, Choice)}
-PLACES = {quantity.attribute: place for place, quantity in _QUANTITIES.items()}
+PLACES = {quantity.attribute: place for place, quantity in BENCH_KEYS.items()}
 """Table and key in a scene file for every quantity, by its attribute."""
 
 

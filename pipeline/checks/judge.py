@@ -13,9 +13,11 @@ from pipeline.checks.limits import beyond_limits
 from pipeline.checks.model import colour, excess, halves, phases, slow_change
 from pipeline.checks.residual import Misfit, Outcome, Residual, residual_of
 from pipeline.checks.rounding import rounding
-from pipeline.checks.sensor import held, smoothed
+from pipeline.checks.sensor import held, held_count, held_numbers, smoothed
 from pipeline.checks.shape import folded_shape
+from pipeline.motion.at_rest import Rest
 from pipeline.motion.fitted import Fitted
+from pipeline.motion.kinds import FittedMotion
 from pipeline.notice import Notice
 from pipeline.parts.lost_rows import LostRows
 from pipeline.samples.condition import Samples
@@ -33,13 +35,19 @@ TESTS: tuple[Callable[[Residual], Outcome | None], ...] = (
 
 
 def judge(
-    samples: Samples, fitted: Fitted, filter_: SensorFilter | None, lost: LostRows | None = None
+    samples: Samples, motion: FittedMotion, filter_: SensorFilter | None, lost: LostRows | None = None
 ) -> tuple[tuple[Notice, ...], tuple[Misfit, ...]]:
     """Return what the limits and the tests found, and what it adds to the uncertainties.
 
     A solution of the equation of motion is held against the limits and tested for slow changes only: strong damping
-    distorts every period, which would look like a shape.
+    distorts every period, which would look like a shape. A relaxation and two modes are accepted by such a test of
+    their fit. Of a bob at rest only a sensor that holds its readings shows.
     """
+    if not isinstance(motion, Fitted):
+        repeats = held_count(samples) if isinstance(motion, Rest) else 1
+        numbers_of_held = held_numbers(repeats, 1.0 / samples.track.rate_hz)
+        return ((Notice("held_samples", numbers_of_held),) if repeats > 1 else ()), ()
+    fitted = motion
     outcomes = list(beyond_limits(samples, fitted))
     if lost is not None:
         missing = {"places": lost.places, "share": lost.share}

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
-from pipeline.checks.residual import COARSE, Outcome, Residual
+from pipeline.checks.residual import Outcome, Residual
 from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_CURVE, MISFIT, NOTICEABLE, normal_quantile
 from pipeline.numerics.regression import chi2_quantile, correlation_length
+from pipeline.samples.condition import COARSE
 from pipeline.track import F8
 from pipeline.windows.demodulate import FINEST, ROUNDING
 

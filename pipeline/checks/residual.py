@@ -12,16 +12,13 @@ from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.motion.fitted import Fitted
 from pipeline.numerics.levels import FEWEST_FOR_LINE
 from pipeline.numerics.robust import median
-from pipeline.samples.condition import Samples
+from pipeline.samples.condition import COARSE, Samples
 from pipeline.track import F8
 from pipeline.windows.demodulate import model_error
 
 # Parts of the run that must agree on a shape. At a probability of 1e-6 its power must be 23 times its variance, instead
 # of 14 for infinitely many parts (F distribution with 2 and 30 degrees of freedom).
 PARTS = 16
-# Ratio of step to noise above which the step is coarse: rounding makes 56 % of the variance. It is 3.5 for rounding
-# alone. Readings with a ratio of 2.5 still have correlations, measured by `python -m tests.golden --only kamjha`.
-COARSE = 2.6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -11,37 +11,46 @@ from pipeline.bench.spring import GRAVITY_M_PER_S2
 from pipeline.damping.law_fit import LawFit
 from pipeline.damping.laws import words_of
 from pipeline.damping.select import Damping
+from pipeline.motion.at_rest import Rest
 from pipeline.motion.by_samples import FEW_WINDOWS
-from pipeline.motion.fitted import Fitted, Rest
+from pipeline.motion.fitted import Fitted, RestPosition
+from pipeline.motion.kinds import FittedMotion
 from pipeline.motion.relaxation import Relaxation
+from pipeline.motion.two_modes import TwoModes
 from pipeline.notice import Notice
+from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.levels import NOTICEABLE, VERY_STRONG
 from pipeline.units import amount, number
 from pipeline.windows.cycles import Cycles
 from pipeline.windows.demodulate import model_error
 
 
-def relaxation_findings(found: Relaxation) -> Iterator[Notice]:
-    """Yield what damping does that ends a motion within a few cycles, or before one cycle is complete."""
-    if found.kind == "strong":
-        yield Notice("strongly_damped", {"damping_ratio": found.damping_ratio.value, "why": found.why})
-    else:
-        rates = {name: x.value for name, x in found.estimates.items() if name.startswith("relaxation_rate")}
-        yield Notice("overdamped", {**rates, "why": found.why})
+def kind_findings(motion: FittedMotion, estimates: Mapping[str, Estimate]) -> Iterator[Notice]:
+    """Yield what kind of motion a recording shows, if it is not an oscillation of many cycles."""
+    if isinstance(motion, Relaxation) and motion.kind == "strong":
+        yield Notice("strongly_damped", {"damping_ratio": motion.damping_ratio.value, "why": motion.why})
+    elif isinstance(motion, Relaxation):
+        rates = {name: x.value for name, x in estimates.items() if name.startswith("relaxation_rate")}
+        yield Notice("overdamped", {**rates, "why": motion.why})
+    elif isinstance(motion, TwoModes):
+        both = {name: x.value for name, x in estimates.items() if "_mode_" in name}
+        yield Notice("two_modes", {**both, "why": motion.why})
+    elif isinstance(motion, Rest):
+        yield Notice("no_oscillation", {"why": motion.why})
 
 
-def fit_findings(fitted: Fitted, misfit: str) -> Iterator[Notice]:
-    """Yield what the fits of the samples came to; ``misfit`` says why the equation of motion was not fitted."""
+def fit_findings(fitted: Fitted) -> Iterator[Notice]:
+    """Yield what the fits of the samples came to."""
     if fitted.method == "equation":
         yield Notice("strongly_damped", {"why": fitted.why})
     elif fitted.why:
         yield Notice("not_converged", {"tried": fitted.why})
-    if misfit:
-        yield Notice("not_converged", {"why": misfit})
+    if fitted.misfit:
+        yield Notice("not_converged", {"why": fitted.misfit})
 
 
 def motion_findings(cycles: Cycles, fitted: Fitted) -> Iterator[Notice]:
-    """Yield what the fit shows of the motion."""
+    """Yield what the fit of an oscillation shows of its motion."""
     windows, phase, rest = fitted.windows, fitted.phase, fitted.rest
     count, omega = windows.t.size, phase.angular_frequency.value
     if count < FEW_WINDOWS:
@@ -64,7 +73,7 @@ def motion_findings(cycles: Cycles, fitted: Fitted) -> Iterator[Notice]:
     yield from _modes(fitted, rest.mean.unit)
 
 
-def _rest_drift(rest: Rest, u_rate: float) -> Notice:
+def _rest_drift(rest: RestPosition, u_rate: float) -> Notice:
     numbers = {"drift_m": rest.drift}
     if rest.mean.unit == "m" and rest.mean.value > 0.0:
         share, seconds = rest.drift / rest.mean.value, float(np.ptp(rest.t))

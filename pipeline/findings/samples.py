@@ -7,11 +7,10 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from pipeline.bench.instrument import Instrument
 from pipeline.checks.echoes import count_quality
-from pipeline.checks.residual import COARSE
 from pipeline.notice import Notice
 from pipeline.numerics.levels import NEGLIGIBLE, SIGNIFICANT
 from pipeline.parts.spans import Partition, Span, SpanKind
-from pipeline.samples.condition import Samples
+from pipeline.samples.condition import COARSE, Samples
 from pipeline.track import U8, Track
 
 

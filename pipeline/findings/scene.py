@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
+from pipeline.bench.plausible import Slip, slips
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import HEAVIEST_SHARE
 from pipeline.notice import Notice
+from pipeline.numerics.estimate import Estimate
 from pipeline.results.effects import Effect
 
+# Drag coefficients of bodies in a stream lie within 0.3 (sphere) and, for an oscillating disc at KC of 0.1, near 10
+# (J. M. R. Graham, J. Fluid Mech. 97 (1980) 331); all damping counts as drag here, which adds a factor of five.
+USUAL_DRAG = (0.3, 50.0)
 
-def scene_findings(scene: Scene, effects: tuple[Effect, ...], *, constant: bool = True) -> Iterator[Notice]:
+
+def scene_findings(scene: Scene, effects: tuple[Effect, ...], estimates: Mapping[str, Estimate]) -> Iterator[Notice]:
     """Yield what is missing or implausible in a scene; the effects say whether the mass of the spring counts.
 
-    ``constant`` says whether a spring constant is derived: the angle of a pendulum gives none.
+    ``estimates`` are the results: the angle of a pendulum gives no spring constant.
 
     >>> bare = Scene.from_mapping({"bob": {"mass_kg": 0.2}})
-    >>> [found.code for found in scene_findings(bare, ())]
+    >>> [found.code for found in scene_findings(bare, (), {"spring_constant": Estimate(14.0, 0.1, "N/m")})]
     ['spring_mass_missing', 'uncertainty_missing']
     """
     springs = any(effect.name == "spring_mass" and effect.included for effect in effects)
@@ -27,10 +33,21 @@ def scene_findings(scene: Scene, effects: tuple[Effect, ...], *, constant: bool 
         "[disc] diameter_m": scene.disc_diameter_m,
     }
     exact = [name for name, estimate in used.items() if estimate is not None and estimate.u == 0]
-    if unusual := scene.unusual():
-        said = [f"{clause}{mark or '.'}" for clause, mark in unusual]
-        yield Notice("scene_implausible", {"first": said[0], "more": len(said) - 1 or None, "all": " ".join(said)})
-    if constant and scene.bob_mass_kg is not None and scene.spring_mass_kg is None:
+    perhaps = [*slips(scene), *_drag(scene, estimates)]
+    if perhaps:
+        said = [each.clause if each.asks else f"{each.clause}." for each in perhaps]
+        numbers = {"first": said[0], "more": len(said) - 1 or None, "all": " ".join(said)}
+        yield Notice("scene_implausible", numbers, None if any(each.decides for each in perhaps) else "info")
+    if "spring_constant" in estimates and scene.bob_mass_kg is not None and scene.spring_mass_kg is None:
         yield Notice("spring_mass_missing", {"heaviest": HEAVIEST_SHARE})
     if exact:
         yield Notice("uncertainty_missing", {"inputs": ", ".join(exact)})
+
+
+def _drag(scene: Scene, estimates: Mapping[str, Estimate]) -> Iterator[Slip]:
+    """Yield a drag coefficient that no disc has, unless the diameter is in doubt already."""
+    drag, named = estimates.get("drag_coefficient"), any("[disc]" in each.clause for each in slips(scene))
+    low, high = USUAL_DRAG
+    if drag is not None and not named and not low - 2.0 * drag.u <= drag.value <= high + 2.0 * drag.u:
+        clause = f"the drag coefficient would be {drag.value:.2g}, which no disc has: is [disc] diameter_m right?"
+        yield Slip(clause, asks=True, decides=False)

@@ -18,7 +18,7 @@ from pipeline.damping.law_fit import LawFit
 from pipeline.damping.laws import Law
 from pipeline.damping.select import Damping
 from pipeline.modes.mode import Modes
-from pipeline.motion.fitted import Fitted, Method, Phase, Rest, TimeTable, Waveform, delay, wrapped
+from pipeline.motion.fitted import Fitted, Method, Phase, RestPosition, TimeTable, Waveform, delay, wrapped
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_LINE, VERY_STRONG
 from pipeline.numerics.regression import (
@@ -99,7 +99,9 @@ def fit_windows(windows: Windows, modes: Modes, damping: Damping) -> Fitted:
     return assembled(windows, modes, damping, phase, rest, "windows")
 
 
-def assembled(windows: Windows, modes: Modes, damping: Damping, phase: Phase, rest: Rest, method: Method) -> Fitted:
+def assembled(
+    windows: Windows, modes: Modes, damping: Damping, phase: Phase, rest: RestPosition, method: Method
+) -> Fitted:
     """Return the fitted oscillation with its waveform: rest position, amplitude and phase at every sample."""
     track = modes.samples.track
     used = windows.used
@@ -116,7 +118,15 @@ def assembled(windows: Windows, modes: Modes, damping: Damping, phase: Phase, re
     whole = position if modes.subtracted is None else position + modes.subtracted
     waveform = Waveform(whole, partial(_velocity, best, phase, amplitude, angle), residual, rms)
     return Fitted(
-        windows=windows, modes=modes, damping=damping, phase=phase, rest=rest, waveform=waveform, method=method, why=""
+        windows=windows,
+        modes=modes,
+        damping=damping,
+        phase=phase,
+        rest=rest,
+        waveform=waveform,
+        method=method,
+        why="",
+        misfit="",
     )
 
 
@@ -248,7 +258,7 @@ def area_of(law: Law, theta: F8, t0: float, middle: float, last: float) -> TimeT
     return grid, np.asarray(integral - np.interp(middle, grid, integral))
 
 
-def fit_rest(windows: Windows, unit: str) -> Rest:
+def fit_rest(windows: Windows, unit: str) -> RestPosition:
     """Fit a constant and a polynomial to the windows' rest positions, and decide by BIC whether they drift."""
     t, offset = windows.t, windows.offset
     u = np.maximum(np.sqrt(windows.covariance[:, 2, 2]), 1e-15 * float(np.max(np.abs(offset))) + 1e-100)
@@ -260,7 +270,7 @@ def fit_rest(windows: Windows, unit: str) -> Rest:
     widened = max(spread.correlation, correlation_length(left)) * max(1.0, float(left @ left) / max(left.size - 1, 1))
     estimate = Estimate(mean, math.sqrt(widened / float(weight @ weight)), unit)
     curve = np.asarray(polynomial(t), np.float64)
-    return Rest(estimate, float(np.ptp(curve)), gain > VERY_STRONG, t, curve)
+    return RestPosition(estimate, float(np.ptp(curve)), gain > VERY_STRONG, t, curve)
 
 
 def check_coherence(fitted: Fitted, typical: float) -> NoOscillation | None:

@@ -13,7 +13,7 @@ from pipeline.damping.laws import LAWS, Law
 from pipeline.damping.select import Damping
 from pipeline.motion.averaged import Averaged, area_of, assembled
 from pipeline.motion.fit import Rows, clipped, covariance_of, fit
-from pipeline.motion.fitted import Fitted, Phase, Rest, wrapped
+from pipeline.motion.fitted import Fitted, Phase, RestPosition, wrapped
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import Fit
 from pipeline.numerics.levels import BARE_MENTION, ROUNDS, STRONG
@@ -203,7 +203,7 @@ def _phase(phase: Phase, windows: Windows, best: _OfLaw) -> Phase:
     return replace(found, angular_frequency=omega, phase=start, backbone=backbone, small_swings=small)
 
 
-def _rest(rest: Rest, best: _OfLaw, level: float) -> Rest:
+def _rest(rest: RestPosition, best: _OfLaw, level: float) -> RestPosition:
     """Return the constant, or the curve, of the fit to the samples."""
     _, _, still = best.model.split(best.fit.values)
     curve = level + best.model.rest(rest.t) @ still

@@ -24,7 +24,7 @@ from pipeline.dynamics.integrator import Trajectory
 from pipeline.dynamics.strang import STRANG
 from pipeline.modes.mode import Modes
 from pipeline.motion.fit import Rows, clipped, fit
-from pipeline.motion.fitted import Fitted, Phase, Rest, Waveform, wrapped
+from pipeline.motion.fitted import Fitted, Phase, RestPosition, Waveform, wrapped
 from pipeline.motion.relaxation import LEAST_DAMPING
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import CENTRAL_STEP, Fit, central_differences
@@ -459,7 +459,7 @@ def _described(
     noises = np.full(windows.noises.shape, rms)
     windows = replace(windows, flags=flags, residual=residual, noises=noises)
     # The rest position is the constant one of the record; the place where friction holds the bob may differ.
-    rest = Rest(Estimate(still, float(u[0]), unit), 0.0, False, t, np.full(t.size, still))
+    rest = RestPosition(Estimate(still, float(u[0]), unit), 0.0, False, t, np.full(t.size, still))
     waveform = Waveform(position, partial(np.asarray, model.motion.velocity(rows.t, theta)), residual, rms)
     return Fitted(
         windows=windows,
@@ -470,4 +470,5 @@ def _described(
         waveform=waveform,
         method="equation",
         why=why,
+        misfit="",
     )

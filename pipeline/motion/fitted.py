@@ -14,7 +14,7 @@ from pipeline.damping.select import Damping
 from pipeline.modes.mode import Modes
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.levels import NOTICEABLE
-from pipeline.track import F8
+from pipeline.track import F8, U8
 from pipeline.windows.demodulate import Windows
 
 TimeTable = tuple[F8, F8]  # values at ascending times, s
@@ -53,7 +53,7 @@ class Phase:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rest:
+class RestPosition:
     """The rest position: its mean, and a smooth curve through the windows that counts if it ``drifts``."""
 
     mean: Estimate
@@ -94,10 +94,26 @@ class Fitted:
     modes: Modes  # other oscillations, which may have been subtracted before the fit
     damping: Damping
     phase: Phase
-    rest: Rest
+    rest: RestPosition
     waveform: Waveform  # including the modes
     method: Method
     why: str  # what a method that failed, or the equation of motion, came to
+    misfit: str  # why the equation of motion was not fitted, although the damping requires it
+
+    @property
+    def flags(self) -> U8:
+        """The final flags of all samples, (n,) uint8."""
+        return self.windows.flags
+
+    @property
+    def residual(self) -> F8:
+        """What the motion leaves of every sample, (n,); NaN where none was measured."""
+        return self.waveform.residual
+
+    @property
+    def start_s(self) -> float:
+        """The time for which amplitude, phase and damping rate are stated, s."""
+        return self.phase.t0
 
     def first_shift(self, kappa: float) -> tuple[float, float]:
         """Return the first amplitude, and the shift of the frequency from very small swings to it, over the frequency.

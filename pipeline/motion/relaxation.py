@@ -13,22 +13,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
-from pipeline.bench.disc import effective_mass_kg
-from pipeline.bench.instrument import U_CRYSTAL
-from pipeline.bench.scene import Scene
-from pipeline.bench.spring import unstated_spring_kg
 from pipeline.motion.fit import Rows
 from pipeline.numerics import least_squares
-from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.least_squares import CENTRAL_STEP, Fit
 from pipeline.numerics.levels import FEWEST_FOR_CURVE, MISFIT, STRONG, VERY_STRONG
-from pipeline.numerics.regression import covariance_of
+from pipeline.numerics.regression import correlation_length, covariance_of
 from pipeline.samples.condition import Samples
-from pipeline.track import F8, Track
+from pipeline.track import F8, U8, Quality
 from pipeline.units import noun
 from pipeline.windows.cycles import NoOscillation
 
@@ -207,16 +203,47 @@ BLOCK_MEANS = 300
 LEAST_DAMPING = 0.05
 
 
-@dataclass(frozen=True, slots=True)
+# Names of the parameters; with critical damping there is no ln w.
+DECAY_PARAMETERS = ("rest", "displacement", "velocity", "log_rate", "log_stiffness")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Relaxation:
     """A motion that relaxes with two rates or with one, or an oscillation whose damping ratio is large."""
 
-    why: str  # one sentence that states the rates or the damping ratio
     kind: DampingKind
-    damping_ratio: Estimate  # g/omega0
-    squared_frequency: Estimate  # omega0^2; multiplied by the mass it is the spring constant
-    estimates: Mapping[str, Estimate]
+    joint: Joint  # o, a, v, ln g and ln w, in the record's times and values
+    dof: float  # number of independent samples less that of the parameters
+    noise: Estimate  # of one sample, from the residual
     start_s: float  # time at which the fitted part of the motion begins
+    residual: F8  # (n,) what the motion leaves of every sample, NaN before the start
+    flags: U8  # (n,) with those before the start as outside
+    why: str = ""  # one sentence that states the rates or the damping ratio
+
+    def position(self, t: F8) -> F8:
+        """Return the values (n,) at times t (n,) from the start on."""
+        return DAMPED.at(t - self.start_s, self.joint.values)[0]
+
+    @property
+    def damping_ratio(self) -> Estimate:
+        """The damping ratio g/omega0."""
+        if self.kind == "critical":
+            return Estimate(1.0, 0.0)
+        ratio = math.exp(float(self.joint["log_rate"].value) - 0.5 * float(self.joint["log_stiffness"].value))
+        slope = np.array([1.0, -0.5])
+        return Estimate(ratio, ratio * math.sqrt(float(slope @ self.joint.covariance[3:, 3:] @ slope)))
+
+    def described(self, estimates: Mapping[str, Estimate]) -> str:
+        """Return the sentence that states the rates or the damping ratio."""
+        if self.kind == "critical":
+            return (
+                f"the motion relaxes without oscillating, at {estimates['relaxation_rate']}: "
+                "within its noise it is critically damped, with one rate"
+            )
+        if self.kind == "overdamped":
+            slow, fast = estimates["relaxation_rate_slow"], estimates["relaxation_rate_fast"]
+            return f"the motion is overdamped: it relaxes without oscillating, at {slow} and {fast}"
+        return f"the oscillation is strongly damped: its damping ratio is {self.damping_ratio}"
 
 
 def find_relaxation(samples: Samples) -> Relaxation | NoOscillation | None:
@@ -274,11 +301,23 @@ def _follow(t: F8, y: F8, noise: float, samples: Samples) -> Relaxation | NoOsci
     if choice is None or isinstance(choice, NoOscillation):
         return choice
     kind, found = choice
-    # A residual larger than the noise increases the uncertainties.
-    found = replace(found, covariance=found.covariance * max(1.0, found.chi2 / max(t.size - 5, 1)))
-    spread = math.sqrt(found.chi2 / max(t.size - 5, 1)) * noise
-    noise_found = Estimate(spread, spread / math.sqrt(2.0 * t.size), track.unit)
-    result = _classified(found, kind, float(t[0]), noise_found, track)
+    # A residual larger than the noise increases the uncertainties, and so does one whose neighbours are correlated.
+    correlation = correlation_length(rows.left(DAMPED, found.values))
+    count = max(t.size - found.values.size, 1)
+    covariance = found.covariance * max(1.0, found.chi2 / count) * correlation
+    spread, dof = math.sqrt(found.chi2 / count) * noise, max(count / correlation, 1.0)
+    units = (track.unit, track.unit, f"{track.unit}/s", "", "")
+    before, since = samples.track.t < t[0], samples.track.t - t[0]
+    residual = np.where(before, np.nan, track.y - DAMPED.at(np.where(since > 0.0, since, 0.0), found.values)[0])
+    result = Relaxation(
+        kind=kind,
+        joint=Joint(DECAY_PARAMETERS[: found.values.size], found.values, covariance, units[: found.values.size]),
+        dof=dof,
+        noise=Estimate(spread, spread / math.sqrt(2.0 * dof), track.unit),
+        start_s=float(t[0]),
+        residual=residual,
+        flags=samples.flags | np.where(before, np.uint8(Quality.OUTSIDE), np.uint8(0)),
+    )
     return None if kind == "strong" and result.damping_ratio.value < LEAST_DAMPING else result
 
 
@@ -345,59 +384,3 @@ def _kind(rows: Rows, fit: Decay, fastest: float, unit: str) -> tuple[DampingKin
     if fit.slowest > fastest:
         return None
     return ("overdamped" if fit.square > 0.0 else "strong"), fit
-
-
-def _classified(fit: Decay, kind: DampingKind, start_s: float, noise: Estimate, track: Track) -> Relaxation:
-    from uncertainties import correlated_values, ufloat, umath
-
-    unit = track.unit
-    clock = ufloat(1.0, math.hypot(U_CRYSTAL, track.u_rate))  # the tolerance of a crystal is assumed for every clock
-    offset, a, v, *logarithms = correlated_values(fit.values, fit.covariance)
-    v, rate = v * clock, umath.exp(logarithms[0]) * clock
-    stiffness = rate**2 if fit.critical else umath.exp(logarithms[1]) * clock**2
-    found = {"offset": _estimate(offset, unit), "noise": noise}
-    squared, natural = _estimate(stiffness, "rad^2/s^2"), umath.sqrt(stiffness)
-    ratio = Estimate(1.0, 0.0) if kind == "critical" else _estimate(rate / natural, "")
-    if kind == "critical":
-        found["relaxation_rate"] = _estimate(rate, "1/s")
-        why = (
-            f"the motion relaxes without oscillating, at {found['relaxation_rate']}: "
-            "within its noise it is critically damped, with one rate"
-        )
-    elif kind == "overdamped":
-        fast = rate + umath.sqrt(rate**2 - stiffness)
-        # Computing the slow rate as rate - sqrt(rate**2 - stiffness) would lose digits.
-        found["relaxation_rate_slow"] = _estimate(stiffness / fast, "1/s")
-        found["relaxation_rate_fast"] = _estimate(fast, "1/s")
-        slow, fast = found["relaxation_rate_slow"], found["relaxation_rate_fast"]
-        why = f"the motion is overdamped: it relaxes without oscillating, at {slow} and {fast}"
-    else:
-        # The oscillation is a cosine of amplitude a plus a sine of amplitude (v + g a) / omega.
-        omega = umath.sqrt(stiffness - rate**2)
-        side = (v + rate * a) / omega
-        turn = 2.0 * math.pi
-        found["angular_frequency"] = _estimate(omega, "rad/s")
-        found["frequency"] = _estimate(omega / turn, "Hz")
-        found["period"] = _estimate(turn / omega, "s")
-        found["amplitude"] = _estimate(umath.sqrt(a**2 + side**2), unit)
-        found["phase"] = _estimate(umath.atan2(-side, a), "rad")
-        found["damping_rate"] = _estimate(rate, "1/s")
-        found["quality_factor"] = _estimate(0.5 * natural / rate, "")
-        why = f"the oscillation is strongly damped: its damping ratio is {ratio}"
-    return Relaxation(why, kind, ratio, squared, found, start_s)
-
-
-def _estimate(quantity: Any, unit: str) -> Estimate:
-    return Estimate(quantity.nominal_value, quantity.std_dev, unit)
-
-
-def spring_constant(found: Relaxation, scene: Scene) -> dict[str, Estimate]:
-    """Return :math:`k = \\omega_0^2 M` in N/m by name, M being the oscillating mass; empty without a bob's mass."""
-    if scene.bob_mass_kg is None:
-        return {}
-    spring = scene.spring_mass_kg or unstated_spring_kg(scene.bob_mass_kg.value)
-    mass = effective_mass_kg(scene)
-    u_mass = math.hypot(scene.bob_mass_kg.u, spring.u / 3.0)
-    k = found.squared_frequency.value * mass
-    relative = math.hypot(u_mass / mass, found.squared_frequency.u / found.squared_frequency.value)
-    return {"spring_constant": Estimate(k, k * relative, "N/m")}

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.bench.instrument import U_CRYSTAL
 from pipeline.motion.fit import Rows, fit
-from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.levels import FEWEST_FOR_CURVE, NEGLIGIBLE
 from pipeline.numerics.regression import correlation_length
 from pipeline.samples.condition import Samples
-from pipeline.track import F8
+from pipeline.track import F8, U8
 from pipeline.units import amount
 
 MOTIONLESS = 64.0 * float(np.finfo(np.float64).eps)  # relative scatter of a motionless record by IEEE rounding
@@ -26,12 +25,36 @@ BEATS, PERIODS = 0.8, 3.0  # those of tests/properties/test_no_oscillation.py at
 MOST = 100_000  # maximum number of median spacings, whose fit takes 0.3 s as measured; longer records are not fitted
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class TwoModes:
-    """The period and the amplitude, at the first sample, of the stronger ("first") and of the other mode."""
+    """Two oscillations, the stronger ("first") and the other one, neither of which is the main one."""
 
-    why: str  # one sentence that states the periods and amplitudes of both modes
-    estimates: dict[str, Estimate]
+    # The rest position, then the cosine and sine amplitudes at ``start_s``, angular frequency and decay rate of each
+    # mode, in the record's times and values.
+    joint: Joint
+    dof: float  # number of independent samples less that of the parameters
+    noise: Estimate  # of one sample
+    start_s: float
+    residual: F8  # (n,)
+    flags: U8  # (n,)
+    why: str = ""  # one sentence that states the periods and amplitudes of both modes
+
+    def described(self, estimates: Mapping[str, Estimate]) -> str:
+        """Return the sentence that states the periods and amplitudes of both modes."""
+        periods = [estimates[f"{name}_mode_period"] for name in ("first", "second")]
+        sizes = [estimates[f"{name}_mode_amplitude"] for name in ("first", "second")]
+        first, second = (f"{t} ({amount(a.value, a.unit)})" for t, a in zip(periods, sizes, strict=True))
+        beat_s = 1.0 / abs(1.0 / periods[0].value - 1.0 / periods[1].value)
+        return (
+            f"two modes of like strength oscillate together, at periods of {first} and {second}: "
+            f"they beat every {beat_s:.3g} s"
+        )
+
+
+MODE_PARAMETERS = (
+    "rest",
+    *(f"{mode}_{name}" for mode in ("first", "second") for name in ("cosine", "sine", "omega", "decay")),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,20 +108,19 @@ def find_two_modes(samples: Samples) -> TwoModes | None:
     # A component at a multiple of the slower frequency is not a second mode but a harmonic, as of a square wave.
     if round(fast / slow) > 1 and abs(fast - round(fast / slow) * slow) * span < math.pi:
         return None
-    widened = float(found.residual @ found.residual) / max(y.size - 9, 1) * correlation_length(found.residual)
-    u = np.sqrt(np.maximum(np.diag(found.covariance), 0.0) * widened)
-    results = {}
-    for name, i, omega, size in zip(("first", "second"), places, omegas, sizes, strict=True):
-        period = 2.0 * math.pi / omega
-        relative = math.hypot(float(u[i + 2]) / omega, U_CRYSTAL, samples.track.u_rate)
-        results[f"{name}_mode_period"] = Estimate(period, period * relative, "s")
-        results[f"{name}_mode_amplitude"] = Estimate(scale * size, scale * float(np.max(u[i : i + 2])), unit)
-    descriptions = [
-        f"{results[f'{name}_mode_period']} ({amount(results[f'{name}_mode_amplitude'].value, unit)})"
-        for name in ("first", "second")
-    ]
-    why = f"two modes of like strength oscillate together, at periods of {descriptions[0]} and {descriptions[1]}: "
-    return TwoModes(f"{why}they beat every {span / beats:.3g} s", results)
+    count, correlation = max(y.size - found.values.size, 1), correlation_length(found.residual)
+    spread = math.sqrt(float(found.residual @ found.residual) / count)
+    order = [0, *(k for i in places for k in range(i, i + 4))]
+    # Back to the unit of the record; the rest position was measured from the mean.
+    turn = np.array([scale, *(2 * (scale, scale, 1.0, 1.0))])
+    level = np.array([float(y.mean()), *(8 * (0.0,))])
+    units = (unit, *(2 * (unit, unit, "rad/s", "1/s")))
+    covariance = found.covariance[np.ix_(order, order)] * (spread**2 * correlation)
+    joint = Joint(MODE_PARAMETERS, found.values[order] * turn + level, covariance * np.outer(turn, turn), units)
+    residual = np.full(len(samples.track), np.nan)
+    residual[used] = scale * found.residual
+    dof = max(count / correlation, 1.0)
+    return TwoModes(joint, dof, samples.noise_estimate, float(t[0]), residual, samples.flags)
 
 
 def _strongest(tau: F8, values: F8) -> float:

@@ -31,7 +31,7 @@ EARLY = 0.25
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """The part of a recording that oscillates freely.
+    """The part of a recording that swings freely, or the whole recording if nothing does.
 
     ``samples`` contains the whole recording, in which samples outside the part are flagged. ``partition`` describes the
     part (None for the whole recording), and ``stopped`` says whether friction stopped the bob in it. The times of the
@@ -40,14 +40,27 @@ class Part:
 
     samples: Samples
     partition: Partition | None
-    cycles: Cycles
-    windows: Windows
-    stopped: bool
+    cycles: Cycles | NoOscillation
+    windows: Windows | None = None  # None without cycles
+    stopped: bool = False
     lost: LostRows | None = None
 
+    def beginning(self, start_s: float) -> Partition | None:
+        """Return the partition if the motion begins at a time, before which the bob was held."""
+        first_s = float(self.samples.track.t[self.samples.used][0])
+        if start_s <= first_s:
+            return self.partition
+        return Partition(start_s, math.inf, (Span(SpanKind.HANDLED, first_s, start_s),)).within(self.partition)
 
-def find_part(samples: Samples) -> Part | NoOscillation:
-    """Find the part that oscillates freely.
+
+def find_part(samples: Samples) -> Part:
+    """Find the part that oscillates freely; without cycles it is the whole recording."""
+    part = _free_part(samples)
+    return part if isinstance(part, Part) else Part(samples, None, part)
+
+
+def _free_part(samples: Samples) -> Part | NoOscillation:
+    """Return the part that oscillates freely, or why no cycles are found.
 
     The time before the trigger, the time long after the stop and all but one free part are left out. The samples are
     samples again after each step, because the part left out may have hidden the noise of the rest.

@@ -22,13 +22,18 @@ from pipeline.damping.laws import Drag, Law, free_power
 from pipeline.damping.laws.drag import COEFFICIENTS
 from pipeline.damping.local import local_decay
 from pipeline.damping.select import Damping
+from pipeline.motion.at_rest import Rest
 from pipeline.motion.fitted import Fitted, Phase
+from pipeline.motion.kinds import FittedMotion
+from pipeline.motion.relaxation import Relaxation
+from pipeline.motion.two_modes import TwoModes
 from pipeline.numerics.estimate import Estimate, Joint, UpperLimit
 from pipeline.numerics.levels import LIMIT
 from pipeline.numerics.robust import U_OF_MAD, mad_sigma
 from pipeline.quantities import QUANTITIES
 from pipeline.results.ambient import Ambient
 from pipeline.results.budget import Budget, Inputs, function_of, joint_of
+from pipeline.results.closed_form import closed_form
 from pipeline.results.curves import Curve, drag_curve, energy_curve
 from pipeline.results.effects import Effect
 from pipeline.results.formulas import solve
@@ -118,7 +123,7 @@ class Derived:
 
 
 def derive(
-    track: Track, fitted: Fitted, scene: Scene, effects: tuple[Effect, ...], misfits: tuple[Misfit, ...]
+    track: Track, motion: FittedMotion, scene: Scene, effects: tuple[Effect, ...], misfits: tuple[Misfit, ...]
 ) -> Derived:
     """Calculate the results of a run by :mod:`pipeline.results.formulas`, and propagate their uncertainties.
 
@@ -133,10 +138,12 @@ def derive(
     Results that depend on the damping law are averages over laws (:func:`pipeline.damping.average.average_over_laws`):
     :math:`x = \\sum_i w_i x_i` and :math:`u^2 = \\sum_i w_i (u_i^2 + (x_i - x)^2)`.
     """
-    inputs = Inputs()
+    inputs, unit = Inputs(), track.unit
+    if not isinstance(motion, Fitted):
+        return _closed(track, motion, scene, inputs)
+    fitted = motion
     laws = _Laws(fitted.damping, inputs, fitted.windows)
-    unit = track.unit
-    of_scene = _of_scene(track, scene, effects, inputs)
+    of_scene = _of_scene(track, scene, {effect.name for effect in effects if effect.included}, inputs)
     every = solve(of_scene | _of_motion(track, fitted, misfits, laws, inputs))
     coefficients = every["coefficients"]
     found = {name: (x, _unit_of(name, unit)) for name, x in every.items() if name in QUANTITIES}
@@ -154,6 +161,39 @@ def derive(
         law_of_coefficients=laws.shown.name,
         quoted=laws.quoted,
         scales=(every["rates"], every["lengths"]),
+        **parts,
+    )
+
+
+def _closed(track: Track, motion: Relaxation | TwoModes | Rest, scene: Scene, inputs: Inputs) -> Derived:
+    """Return the results of a motion without laws, with the clock, scale and zero of the instrument."""
+    instrument, unit = Instrument.of(track), track.unit
+    of_scene = _of_scene(track, scene, {"added_mass", "spring_mass"}, inputs)
+    rate, scale = inputs.add("clock_rate", instrument.clock_rate, "B"), of_scene["distance_scale"]
+    x = dict(zip(motion.joint.names, inputs.add_joint("fitted_motion", motion.joint, "A", motion.dof), strict=True))
+    known = {
+        "time_factor": rate,
+        "rest_position": x["rest"],
+        "sensor_zero": inputs.add("sensor_zero", Estimate(0.0, instrument.u_offset_m, unit), "B"),
+        "offset_misfit": 0.0,
+        "noise_of_samples": inputs.add("noise", motion.noise, "A", motion.dof),
+    }
+    of_motion, results = closed_form(motion, x, rate=rate, scale=scale)
+    every = solve(of_scene | known | of_motion)
+    found = {name: value for name, value in every.items() if name in QUANTITIES} | results
+    budgets = {name: inputs.budget(name, value, _unit_of(name, unit)) for name, value in found.items()}
+    parts = {
+        name: Estimate.of_variable(every[name], _unit_of(name, unit)) if name in every else None for name in _PARTS
+    }
+    return Derived(
+        estimates={name: budget.estimate for name, budget in budgets.items()},
+        coefficients={},
+        budgets=budgets,
+        laws=(),
+        law="",
+        law_of_coefficients="",
+        quoted=False,
+        scales=(rate, scale),
         **parts,
     )
 
@@ -227,9 +267,8 @@ def _of_motion(
     }
 
 
-def _of_scene(track: Track, scene: Scene, effects: tuple[Effect, ...], inputs: Inputs) -> dict[str, Any]:
+def _of_scene(track: Track, scene: Scene, included: set[str], inputs: Inputs) -> dict[str, Any]:
     """Return the inputs of the formulas that the scene gives; None for what it does not state."""
-    included = {effect.name for effect in effects if effect.included}
     air = Ambient(scene, inputs, u_temperature_k=U_AIR_TEMPERATURE_K)
 
     def stated(name: str, value: Estimate | None) -> Any:

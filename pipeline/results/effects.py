@@ -22,7 +22,7 @@ from pipeline.damping.laws.drag import amplitudes
 from pipeline.damping.select import Damping
 from pipeline.dynamics.equation import Problem
 from pipeline.modes.mode import Modes
-from pipeline.motion.fitted import Fitted, Rest
+from pipeline.motion.fitted import Fitted, RestPosition
 from pipeline.numerics.levels import NEGLIGIBLE
 from pipeline.track import Track
 from pipeline.units import amount
@@ -187,7 +187,7 @@ def _backbone(fitted: Fitted) -> Effect:
     return Effect(name, None, shift, "1", True, why)
 
 
-def _rest_drift(rest: Rest, noise: float) -> Effect:
+def _rest_drift(rest: RestPosition, noise: float) -> Effect:
     unit = rest.mean.unit
     if not rest.drifts:
         why = f"a constant rest position describes the record (noise of one sample {amount(noise, unit)})"

@@ -7,14 +7,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.bench.spring import oscillating_mass_kg
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.levels import NEGLIGIBLE, SIGNIFICANT, coverage_factor
+from pipeline.numerics.levels import FALSE_ALARM, NEGLIGIBLE, SIGNIFICANT, coverage_factor
 from pipeline.several.compare import SpringRun, shared_covariance, spring_line
 from pipeline.track import F8
 
+FLAT = 0.1  # slope below which a tightly coiled spring is closed, of the slope of the open one
 GRAVITY = Estimate(9.81, 0.015, "m/s^2")  # 9.780 at the equator to 9.832 at the poles, uniformly distributed
 
 
@@ -69,13 +71,20 @@ def mass_line(runs: Sequence[SpringRun], mass_correlation: float = 0.0) -> MassL
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hooke:
-    """A spring constant by Hooke's law, :math:`y = y_0 \\pm (g/k) m`, with the points in kg and m and their line."""
+    """A spring constant by Hooke's law from loads, positions in m and their line, each (n,) in the order of the loads.
+
+    Loads are forces in N, or masses in kg: then the line is :math:`y = y_0 \\pm (g/k) m`. ``straight`` (n,) says which
+    points the line is fitted to, and ``bend`` why others are not: "" if all are.
+    """
 
     constant: Estimate
     expanded: float  # expanded uncertainty of the constant, N/m; its scatter has n - 2 degrees of freedom
-    mass_kg: F8
+    load: F8
+    load_unit: str
     position_m: F8
     line_m: F8
+    straight: NDArray[np.bool_]
+    bend: str = ""
 
     def normalised_error(self, other: Estimate) -> float:
         """Return :math:`E_n = |k_1 - k_2| / \\sqrt{U_1^2 + U_2^2}`: at most 1 if two constants agree."""
@@ -83,18 +92,75 @@ class Hooke:
         return abs(self.constant.value - other.value) / expanded
 
 
-def hooke(mass_kg: F8, position_m: F8) -> Hooke:
-    """Fit a line to rest positions; its u comes from their scatter, and from that of g, 9.81(2) m/s^2."""
-    if len(mass_kg) < 3 or np.ptp(mass_kg) <= 0.0:
-        raise AnalysisError(f"Hooke's law needs three masses at least, got {len(np.unique(mass_kg))}", "hang on more")
-    design = np.column_stack([np.ones_like(mass_kg), mass_kg - mass_kg.mean()])
-    (middle, slope), *_ = np.linalg.lstsq(design, position_m, rcond=None)
-    line = design @ np.array([middle, slope])
-    u_slope = math.sqrt(float(np.sum((position_m - line) ** 2)) / (len(mass_kg) - 2) / float(np.sum(design[:, 1] ** 2)))
+FEWEST_BENT = 6  # points that two lines with a common corner need, for two degrees of freedom
+
+
+def hooke(load: F8, position_m: F8, unit: str = "kg") -> Hooke:
+    """Fit a line to rest positions; its u comes from their scatter, and for masses from that of g, 9.81(2) m/s^2.
+
+    A tightly coiled spring is not stretched by the smallest loads, and one that is stretched too far becomes softer.
+    Where two lines with a common corner fit better than one (F test at the shared probability over all corners), k is
+    that of the line that stretches the spring in proportion: of the upper one if the lower is flat, else of the lower.
+    """
+    if len(load) < 3 or np.ptp(load) <= 0.0:
+        raise AnalysisError(f"Hooke's law needs three masses at least, got {len(np.unique(load))}", "hang on more")
+    order = np.argsort(load, kind="stable")
+    load, position_m = load[order], position_m[order]
+    straight, bend = _straight(load, position_m)
+    middle, slope, u_slope = _line(load[straight], position_m[straight])
     if abs(slope) <= SIGNIFICANT * u_slope:
         raise AnalysisError("the positions do not follow the masses", "check the columns of the table")
-    k, u = GRAVITY.value / abs(slope), np.array([u_slope / slope, GRAVITY.u / GRAVITY.value])
+    factor = GRAVITY if unit == "kg" else Estimate(1.0, 0.0)
+    k, u = factor.value / abs(slope), np.array([u_slope / slope, factor.u / factor.value])
     # Both parts are expanded by themselves: an effective number of degrees of freedom would be large where two or three
     # positions lie on the line by chance.
-    expanded = float(np.linalg.norm(u * [coverage_factor(len(mass_kg) - 2), coverage_factor(math.inf)]))
-    return Hooke(Estimate(k, k * float(np.linalg.norm(u)), "N/m"), k * expanded, mass_kg, position_m, line)
+    free = int(np.count_nonzero(straight)) - 2
+    expanded = float(np.linalg.norm(u * [coverage_factor(free), coverage_factor(math.inf)]))
+    return Hooke(
+        constant=Estimate(k, k * float(np.linalg.norm(u)), "N/m"),
+        expanded=k * expanded,
+        load=load,
+        load_unit=unit,
+        position_m=position_m,
+        line_m=middle + slope * (load - float(np.mean(load[straight]))),
+        straight=straight,
+        bend=bend,
+    )
+
+
+def _line(load: F8, position_m: F8) -> tuple[float, float, float]:
+    """Return the position at the mean load, the slope and its u from the scatter."""
+    about = load - load.mean()
+    slope = float(about @ position_m / (about @ about))
+    residual = position_m - position_m.mean() - slope * about
+    return float(position_m.mean()), slope, math.sqrt(float(residual @ residual / (load.size - 2) / (about @ about)))
+
+
+def _straight(load: F8, position_m: F8) -> tuple[NDArray[np.bool_], str]:
+    """Return which points, by their loads, lie where the spring is stretched in proportion; why others do not."""
+    from scipy.special import fdtrc
+
+    every, free = np.ones(load.size, np.bool_), load.size - 4
+    corners = np.unique(load)[2:-2]
+    if load.size < FEWEST_BENT or not corners.size:
+        return every, ""
+
+    def left(corner: float | None) -> float:
+        columns = [np.ones_like(load), load - load.mean()]
+        columns += [] if corner is None else [np.maximum(load - corner, 0.0)]
+        design = np.column_stack(columns)
+        residual = position_m - design @ np.linalg.lstsq(design, position_m, rcond=None)[0]
+        return float(residual @ residual)
+
+    tried = np.concatenate([corners, 0.5 * (corners[1:] + corners[:-1])])
+    bent = np.array([left(corner) for corner in tried.tolist()])
+    corner = float(tried[int(np.argmin(bent))])
+    better = (left(None) - float(bent.min())) / 2.0 / (float(bent.min()) / free + 1e-30)
+    if float(fdtrc(2.0, free, better)) * tried.size > FALSE_ALARM:
+        return every, ""
+    below, above = load <= corner, load >= corner
+    _, slope, u_slope = _line(load[below], position_m[below])
+    _, steeper, _ = _line(load[above], position_m[above])
+    if abs(slope) < max(SIGNIFICANT * u_slope, FLAT * abs(steeper)):
+        return above, "the spring is not stretched by the smaller loads: it has an initial tension"
+    return below, "beyond these the spring is stretched out of proportion"

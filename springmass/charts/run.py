@@ -120,23 +120,9 @@ def model_motion(motion: Oscillation, t: F8) -> tuple[F8, F8]:
 
 
 def _relaxing(a: Analysis, motion: Relaxation) -> tuple[F8, F8]:
-    """Return times and values of a relaxation: a linear fit of amplitudes and rest at the fitted rates."""
-    x, used = motion.estimates, used_samples(a) & (a.track.t >= motion.start_s)
-
-    def columns(t: F8) -> F8:
-        since = t - motion.start_s
-        if motion.kind == "strong":
-            turn = x["angular_frequency"].value * since
-            pair = np.exp(-x["damping_rate"].value * since) * np.array([np.cos(turn), np.sin(turn)])
-        elif motion.kind == "critical":
-            pair = np.exp(-x["relaxation_rate"].value * since) * np.array([np.ones_like(since), since])
-        else:
-            pair = np.array([np.exp(-x[f"relaxation_rate_{name}"].value * since) for name in ("slow", "fast")])
-        return np.column_stack([np.ones_like(since), *pair])
-
-    weights, *_ = np.linalg.lstsq(columns(a.track.t[used]), a.track.y[used], rcond=None)
+    """Return times and values of a relaxation."""
     grid = np.linspace(motion.start_s, float(np.nanmax(a.track.t)), 600)
-    return grid, np.asarray(columns(grid) @ weights)
+    return grid, motion.position(grid)
 
 
 def _rest(a: Analysis, motion: Oscillation, factor: float) -> Panel:

@@ -91,12 +91,17 @@ def masses(line: MassLine) -> Chart:
 
 
 def static(hooke: Hooke) -> Chart:
-    """Rest positions against the mass, with the line of Hooke's law."""
-    order = np.argsort(hooke.mass_kg)
-    mass, position, line = (1e3 * each[order] for each in (hooke.mass_kg, hooke.position_m, hooke.line_m))
-    series = (line_of("line", mass, line), Series("rest position", mass, position))
-    caption = f"Rest position of every mass. The line has the slope g/k with k = {pretty(hooke.constant)}."
-    return Chart("hooke", "Hooke's law", caption, (Panel("position / mm", series, x_label="mass on the spring / g"),))
+    """Rest positions against the load, with the line of Hooke's law."""
+    by_mass, used = hooke.load_unit == "kg", hooke.straight
+    load, position, line = hooke.load * (1e3 if by_mass else 1.0), 1e3 * hooke.position_m, 1e3 * hooke.line_m
+    series = [line_of("line", load[used], line[used]), Series("rest position", load[used], position[used])]
+    if not used.all():
+        series.append(Series("not on the line", load[~used], position[~used], "flagged"))
+    slope = "g/k" if by_mass else "1/k"
+    bend = f" {hooke.bend[:1].upper()}{hooke.bend[1:]}." if hooke.bend else ""
+    caption = f"Rest position of every load. The line has the slope {slope} with k = {pretty(hooke.constant)}.{bend}"
+    x_label = "mass on the spring / g" if by_mass else "force on the spring / N"
+    return Chart("hooke", "Hooke's law", caption, (Panel("position / mm", tuple(series), x_label=x_label),))
 
 
 def course(label: str, rows: Sequence[tuple[str, float, float]], differing: Mapping[str, str]) -> Chart:

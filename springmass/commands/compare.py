@@ -53,7 +53,7 @@ class CompareOptions:
     ] = None
     hooke: Annotated[
         FileArgument | None,
-        option("FILE", "table of masses and rest positions: k by Hooke's law beside that of the runs"),
+        option("FILE", "table of masses or forces and positions: k by Hooke's law beside that of the runs"),
     ] = None
     output: Annotated[FileArgument | None, output("DIR", "folder for a report (default: write no report)")] = None
     figures: FiguresOption = ()

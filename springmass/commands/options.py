@@ -15,6 +15,9 @@ from springmass.commands.parameters import LawName, Positive, TcpPort, argument,
 from springmass.errors import ProgramError
 from springmass.loading.options import LOAD_FIELDS, Accuracy, AnalysisOptions, LoadOptions
 
+if TYPE_CHECKING:
+    from pipeline.numerics.estimate import Estimate
+
 FileArgument = str | Path
 """The name of a file; a shell completes it."""
 HOW_READ = Group("How the recording is read", sort_key=2)
@@ -30,6 +33,13 @@ def converted(metavar: str, words: str, convert: Callable[[str], Any]) -> Parame
         return tuple(convert(token.value) for token in tokens)
 
     return Parameter(metavar=metavar, help=words, converter=every, accepts_keys=False, n_tokens=1)
+
+
+def _decoder_option(text: str) -> tuple[str, Any]:
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise ValueError("must be NAME=VALUE")
+    return name, int(value) if value.isdecimal() else value
 
 
 def _formats(_: Any, tokens: Sequence[Token]) -> tuple[str, ...]:
@@ -54,33 +64,17 @@ FiguresOption = Annotated[
     ),
 ]
 Json = Annotated[bool, Parameter(name="--json", help="print JSON on standard output")]
+DecoderOptions = Annotated[
+    tuple[tuple[str, Any], ...], converted("NAME=VALUE", "option of the decoder; may be repeated", _decoder_option)
+]
 Overwrite = Annotated[bool, flag("replace an existing output")]
 Strict = Annotated[bool, flag("exit with code 5 if a finding is an error")]
 
 
-def measured(text: str) -> float | dict[str, float]:
-    """Return a number that was typed, as a scene states it: with the standard uncertainty that was typed with it.
+def _mass(_: Any, tokens: Sequence[Token]) -> Estimate:
+    from pipeline.bench.typed import typed
 
-    >>> measured("0.2007"), measured("0.2007+/-0.0001"), measured("0.2007(1)")
-    (0.2007, {'value': 0.2007, 'u': 0.0001}, {'value': 0.2007, 'u': 0.0001})
-    """
-    from uncertainties import ufloat_fromstr
-    from uncertainties.core import NegativeStdDev
-
-    try:
-        return float(text)  # a number alone is exact, while the library would take its last digit for uncertain
-    except ValueError:
-        try:
-            number = ufloat_fromstr(text)
-        except (ValueError, NegativeStdDev):
-            raise ValueError(
-                "must be a number, with its standard uncertainty as 0.2007+/-0.0001 or 0.2007(1)"
-            ) from None
-    return {"value": number.nominal_value, "u": number.std_dev}
-
-
-def _measured(_: Any, tokens: Sequence[Token]) -> float | dict[str, float]:
-    return measured(tokens[0].value)
+    return typed(tokens[0].value, "kg")
 
 
 def _setting(text: str) -> tuple[tuple[str, str], Any]:
@@ -88,13 +82,12 @@ def _setting(text: str) -> tuple[tuple[str, str], Any]:
     match = re.fullmatch(r"\s*(\w+)\.(\w+)\s*=\s*(.+)", text)
     if match is None:
         raise ValueError("must be TABLE.KEY=VALUE as in a scene, for example spring.mass_kg=0.0104+/-0.0001")
+    from pipeline.bench.scene import BENCH_KEYS
+    from pipeline.bench.typed import typed
+
     table, key, value = match.groups()
-    try:
-        return (table, key), measured(value)
-    except ValueError:
-        if value[:1] in "+-.0123456789":
-            raise
-        return (table, key), value.strip()
+    quantity = BENCH_KEYS.get((table, key))
+    return (table, key), value.strip() if quantity is None else typed(value, quantity.unit)
 
 
 @Parameter(name="*", group=Group("The bench, instead of the values in the scene", sort_key=1.5))
@@ -105,7 +98,10 @@ class BenchOptions:
     mass_kg: Annotated[
         Any,
         Parameter(
-            metavar="M", help="all that hangs on the spring, kg: 0.2007+/-0.0001", converter=_measured, n_tokens=1
+            metavar="M",
+            help="all that hangs on the spring, kg: 0.2007+/-0.0001, '200.7 g'",
+            converter=_mass,
+            n_tokens=1,
         ),
     ] = None
     set: Annotated[

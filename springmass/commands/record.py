@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from cyclopts import Parameter
@@ -26,7 +26,7 @@ from pipeline.bench.disc import scene_air
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import format_value
 from springmass.commands.given import GivenOptions
-from springmass.commands.options import FileArgument, PageOptions, converted
+from springmass.commands.options import DecoderOptions, FileArgument, PageOptions
 from springmass.commands.parameters import (
     PartsPerMillion,
     Positive,
@@ -65,13 +65,6 @@ SIMULATED_FAMILY = "line-protocol"
 UNLIMITED_S = 3600.0  # assumed duration of a run without --seconds, for the check of disk space
 
 
-def _decoder_option(text: str) -> tuple[str, Any]:
-    name, equals, value = text.partition("=")
-    if not equals:
-        raise ValueError("must be NAME=VALUE")
-    return name, int(value) if value.isdecimal() else value
-
-
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class RecordOptions:
@@ -96,9 +89,12 @@ class RecordOptions:
     rate_hz: Annotated[ReadingsPerSecond | None, option("R", "rate that the sensor is set to, readings per second")] = (
         None
     )
-    option: Annotated[
-        tuple[tuple[str, Any], ...], converted("NAME=VALUE", "option of the decoder; may be repeated", _decoder_option)
-    ] = ()
+    framing: Annotated[str, option("7E1", "data bits, parity and stop bits of the ports (default: 8N1)")] = "8N1"
+    wait: Annotated[
+        Positive | None, option("S", "seconds for a board to begin (default: 3, or 12 if it starts up)")
+    ] = None
+    send: Annotated[str, option("TEXT", "text that makes a board begin, sent each second until it does")] = ""
+    option: DecoderOptions = ()
     still: Annotated[Positive | None, option("S", "first measure rest position and noise for S seconds")] = None
     ruler: Annotated[
         tuple[Positive, ...], option("M", "ruler distance of the bob at rest, m; may be repeated; needs --still")
@@ -133,7 +129,9 @@ def record(
             given.refuse(use, *names)
     _fill_standard_streams()
     if not options.simulate:
-        ports, names, baud = name_sensors(options.port, options.sensor, options.baud)
+        ports, names, baud = name_sensors(
+            options.port, options.sensor, options.baud, options.framing, options.wait or 0.0, options.send.encode()
+        )
         options = replace(options, port=ports, sensor=names, baud=baud)
     demand_new(out, len(options.port))
     scene = EXAMPLE if options.simulate else None
@@ -295,7 +293,7 @@ class _Bench:
     def record(self) -> Ended:
         """Run the session, with a page from before its beginning to its end."""
         options = self.options
-        self.session.listen(self.console.line)
+        self.session.listen(self.console.line, options.wait, options.send.encode())
         operator = None if self.page is None else Operator(self.session, self.page, self.log)
         try:
             if operator is not None:
@@ -401,7 +399,7 @@ def _sensors(options: RecordOptions, scene: Scene | None, release: Release) -> I
         sensors = []
         for address, family in zip(addresses, families * (len(addresses) // len(families)), strict=True):
             baud = options.baud or family.baud
-            port = SerialPort(address, baud)
+            port = SerialPort(address, baud, options.framing)
             opened.callback(port.close)
             sensors.append(OpenSensor(family, port, options.rate_hz, given, calibration, baud, options.clock_ppm))
         if virtual is not None:

@@ -135,7 +135,11 @@ def line_and_hooke_words(compared: SpringComparison) -> list[str]:
             f"mass of the spring, a third of its mass, is {grams}."
         )
     if static is not None:
-        text, error = f"Hooke's law: k = {static.constant} from {len(static.mass_kg)} masses", compared.normalised_error
+        count, every = int(static.straight.sum()), len(static.load)
+        some = f"{count} of {every}" if static.bend else str(every)
+        what = "masses" if static.load_unit == "kg" else "forces"
+        bend = f" ({static.bend})" if static.bend else ""
+        text, error = f"Hooke's law: k = {static.constant} from {some} {what}{bend}", compared.normalised_error
         if error is not None:
             text += f"; E_n = {error:.2g}, it {'agrees' if error <= 1.0 else 'does not agree'} with the oscillation"
         lines.append(f"{text}.")

@@ -83,16 +83,23 @@ def read_rows(path: str | os.PathLike[str], what: str) -> tuple[list[str], list[
     return names, rows
 
 
-_COLUMN = re.compile(r"(mass|position)[\s_(/\[]*(kg|g|m|cm|mm)[)\]]?")
-_SI = {"kg": 1.0, "g": 1e-3, "m": 1.0, "cm": 1e-2, "mm": 1e-3}
+_COLUMN = re.compile(
+    r"(?P<what>mass|force|load|weight|position|extension|elongation|displacement|length)"
+    r"[\s_(/\[]*(?P<unit>kg|g|mn|n|m|cm|mm)[)\]]?"
+)
+_SI = {"kg": ("kg", 1.0), "g": ("kg", 1e-3), "n": ("N", 1.0), "mn": ("N", 1e-3)}  # names of columns are in lower case
+_METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 
 
 def read_hooke(path: str | os.PathLike[str]) -> Hooke:
-    """Return the spring constant of a table with the columns mass_kg and position_m, or mass (g) and position (cm)."""
+    """Return the spring constant of a table of masses or forces with positions or extensions, each with its unit."""
     names, rows = read_rows(path, "table")
-    columns = {match[1]: (name, _SI[match[2]]) for name in names if (match := _COLUMN.fullmatch(name))}
-    if len(columns) < 2:
-        raise ProgramError(f"{path}: expected the columns mass_kg and position_m (or mass (g), position (cm))")
-    (mass, to_kg), (position, to_m) = columns["mass"], columns["position"]
-    masses = np.array([row.number(mass) * to_kg for row in rows])
-    return hooke(masses, np.array([row.number(position) * to_m for row in rows]))
+    found = [(name, match["unit"]) for name in names if (match := _COLUMN.fullmatch(name))]
+    loads = [(name, *_SI[unit]) for name, unit in found if unit in _SI]
+    positions = [(name, _METRES[unit]) for name, unit in found if unit in _METRES]
+    if len(loads) != 1 or len(positions) != 1:
+        wanted = f"{path}: expected one column of loads and one of positions, got {', '.join(names)}"
+        raise ProgramError(wanted, "name them mass (g) or force (N), and position (cm) or extension (m)")
+    (load, unit, to_load), (position, to_m) = loads[0], positions[0]
+    loaded = np.array([row.number(load) * to_load for row in rows])
+    return hooke(loaded, np.array([row.number(position) * to_m for row in rows]), unit)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.bench.plausible import slips
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
 from pipeline.several.compare import SpringRun
@@ -100,7 +101,7 @@ def _agreement(quantity: str, name: str, group: Sequence[CourseRun]) -> Agreemen
 def _run(row: Mapping[str, Any], bench: str, *, alone: bool) -> CourseRun:
     name = row["run"] if alone else f"{row[COURSE]}: {row['run']}"
     k, omega, mass = (_estimate(row, x) for x in ("spring_constant", "natural_angular_frequency", "own_mass_kg"))
-    bob, spring = _estimate(row, "bob_mass_kg"), _estimate(row, "spring_mass_kg")
+    bob, spring, disc = (_estimate(row, x) for x in ("bob_mass_kg", "spring_mass_kg", "disc_diameter_m"))
     points = np.array(json.loads(row.get("drag_points") or "[]"))
     middle = points[len(points) // 2] if len(points) else None
     on_spring = spring_constant = None
@@ -109,6 +110,7 @@ def _run(row: Mapping[str, Any], bench: str, *, alone: bool) -> CourseRun:
         spring_constant = Estimate(
             k.value, k.value * math.hypot(2.0 * omega.u / omega.value, mass.u / mass.value), "N/m"
         )
+    bench_of_run = Scene(bob_mass_kg=bob, spring_mass_kg=spring, disc_diameter_m=disc)
     return CourseRun(
         name=name,
         spring=_label(row, "spring", "spring_mass_kg"),
@@ -120,7 +122,7 @@ def _run(row: Mapping[str, Any], bench: str, *, alone: bool) -> CourseRun:
         unit=row.get("unit") or "",
         on_spring=on_spring,
         spring_mass_kg=spring,
-        implausible="; ".join(f"{clause}{mark}" for clause, mark in Scene(bob_mass_kg=bob).unusual()),
+        implausible="; ".join(each.clause for each in slips(bench_of_run) if each.decides),
     )
 
 

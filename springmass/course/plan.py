@@ -23,7 +23,8 @@ from acquisition.recordings.identify import dialect_folder
 from acquisition.recordings.reading import READ_FIELDS, ValueKind
 from acquisition.regular_file import open_regular, read_regular
 from pipeline.bench.law_names import ANY_LAW, law_names
-from pipeline.bench.scene import PLACES, Scene
+from pipeline.bench.scene import BENCH_KEYS, PLACES, Scene
+from pipeline.bench.typed import typed
 from springmass import __version__
 from springmass.comparing.user_table import Row, read_rows
 from springmass.course.results_csv import RESERVED
@@ -281,7 +282,11 @@ def _values(folder: Path, row: Row) -> Values:
     values |= {name: os.path.join(folder, texts[name]) for name in ("scene", "velocity") if name in texts}
     for name in PLACES:
         if name in texts:
-            values[name] = (row.number(name), row.number(f"{name}_u") if f"{name}_u" in texts else 0.0)
+            try:
+                read = typed(row.plain(name), BENCH_KEYS[PLACES[name]].unit)
+            except ValueError as error:
+                raise ProgramError(f"{row.where}: {name} {error}, got {texts[name]!r}", "correct the table") from error
+            values[name] = (read.value, row.number(f"{name}_u") if f"{name}_u" in texts else read.u)
         elif f"{name}_u" in texts:
             raise ProgramError(f"{row.where}: {name}_u is there without {name}", "fill in both")
     if (law := texts.get(LAW)) not in (None, ANY_LAW, *law_names()):

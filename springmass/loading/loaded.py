@@ -84,7 +84,10 @@ class Loaded:
         recording = self.recording
         track = to_track(self.samples, self.info, recorded_format=recording.format, provenance=self.provenance)
         track = between(track, self.from_s, self.to_s)
-        return track if self.clock_ppm is None else replace(track, clock_limit=self.clock_ppm * 1e-6)
+        if self.clock_ppm is None:
+            return track
+        bound = 1e-6 * self.clock_ppm
+        return replace(track, clock_limit=bound, u_clock=bound / math.sqrt(3.0))
 
     @property
     def source(self) -> str:
@@ -106,9 +109,6 @@ class Loaded:
         low = -math.inf if options.from_s is None else options.from_s
         high = math.inf if options.to_s is None else options.to_s
         ppm = self.clock_ppm if options.clock_ppm is None else options.clock_ppm
-        if options.clock_ppm is not None and self.track.clock_limit is None:
-            problem = f"{self.source or 'arrays'}: clock_ppm has no effect, because no clocks were compared"
-            raise ProgramError(problem, "leave it out")
         part = replace(self, from_s=max(low, self.from_s), to_s=min(high, self.to_s), clock_ppm=ppm)
         if (options.from_s, options.to_s) != (None, None) and not len(part.track):
             times = self.track.t[np.isfinite(self.track.t)]

@@ -12,6 +12,7 @@ from typing import Any
 
 from acquisition.errors import visible
 from acquisition.regular_file import open_regular
+from pipeline.bench.plausible import slips
 from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
 from springmass.errors import LOG, ProgramError
@@ -102,5 +103,5 @@ def ask_about(scene: Scene, where: str | Path) -> None:
 
     This is for recordings and simulations, where no finding reports such values.
     """
-    for clause, mark in scene.unusual():
-        LOG.warning(f"{where}: {clause}{mark}; check value and unit")
+    for slip in slips(scene):
+        LOG.warning(f"{where}: {slip.clause}; check value and unit")

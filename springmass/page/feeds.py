@@ -53,6 +53,9 @@ class LogFeed:
             provenance={"sensor": plain(header.sensors[0]), "events": []},
         )
         self._decoder = LogDecoder(self._sensors, self._begin, self._note)
+        first = self._decoder.chains[self._shown[0]].family
+        timed = first.has_device_time or {"time", "sequence"} & header.sensors[0].options.keys()
+        self.view.clock = "device" if timed else "host"
         self.view.rate_hz = self._decoder.chains[self._shown[0]].timebase.rate_hz
         self._take(())
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pipeline.analyse import Analysis, Oscillation, Still
+from pipeline.analyse import Analysis, Oscillation, Rest
 from pipeline.damping.laws import words_of
 from pipeline.quantities import INPUTS
 from pipeline.results.budget import Contribution
@@ -117,7 +117,7 @@ def summary(analysis: Analysis) -> tuple[tuple[str, str], ...]:
     to_do = ordered[0].advice if ordered else ""
     if not isinstance(motion, Oscillation):
         why = sentence(typeset(motion.why))
-        if isinstance(motion, Still) and "first_mode_period" not in analysis.estimates:
+        if isinstance(motion, Rest):
             why = "Nothing oscillates in this recording; it gives mean and noise only."
         return (("Result", why), *((("What to do", to_do),) if to_do else ()))
     greatest = _greatest(analysis)

@@ -9,7 +9,7 @@ from html import escape
 import numpy as np
 
 from acquisition.errors import visible
-from pipeline.analyse import Analysis, Oscillation, Still
+from pipeline.analyse import Analysis, Oscillation, Rest, TwoModes
 from springmass.result.law_rows import laws_of
 from springmass.result.table1 import table_rows
 from springmass.typeset import law_status, pretty, pretty_number
@@ -77,7 +77,7 @@ def _head(analysis: Analysis, name: str) -> str:
     span = float(np.nanmax(track.t) - np.nanmin(track.t))
     words = f"{name or 'run'}: {track.kind}, {len(track)} samples in {span:.4g} s, "
     words += f"{analysis.quality['used']} used"
-    return f"{words}; {analysis.motion.why}" if isinstance(analysis.motion, Still) else words
+    return f"{words}; {analysis.motion.why}" if isinstance(analysis.motion, Rest | TwoModes) else words
 
 
 def _law(motion: Oscillation) -> str:

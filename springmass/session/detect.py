@@ -16,7 +16,12 @@ PROBED_BAUDS = (115200, 9600)
 
 
 def name_sensors(
-    ports: tuple[str, ...], sensors: tuple[str, ...], baud: int | None
+    ports: tuple[str, ...],
+    sensors: tuple[str, ...],
+    baud: int | None,
+    framing: str = "8N1",
+    wait_s: float = 0.0,
+    send: bytes = b"",
 ) -> tuple[tuple[str, ...], tuple[str, ...], int | None]:
     """Return ports, families and speed of a recording; what was not named is known by what speaks on the ports."""
     if ports and sensors:
@@ -24,7 +29,7 @@ def name_sensors(
     addresses = ports or [port.device for port in list_ports()]
     descriptions, named = [], []
     for address in addresses:
-        heard, families, speed = listen(address, PROBED_BAUDS if baud is None else (baud,))
+        heard, families, speed = listen(address, PROBED_BAUDS if baud is None else (baud,), framing, wait_s, send)
         wanted = [name for name in families if not sensors or name in sensors]
         descriptions.append(f"{address}: {heard}")
         if wanted:
@@ -42,12 +47,18 @@ def name_sensors(
     return tuple(each[0] for each in named), tuple(each[1] for each in named), baud or measured
 
 
-def listen(device: str, bauds: Sequence[int] = PROBED_BAUDS) -> tuple[str, list[str], int]:
+def listen(
+    device: str,
+    bauds: Sequence[int] = PROBED_BAUDS,
+    framing: str = "8N1",
+    wait_s: float = 0.0,
+    send: bytes = b"",
+) -> tuple[str, list[str], int]:
     """Return what a port sends at the usual speeds, which families recognise it, and at which speed."""
     heard = b""
     for baud in bauds:
         try:
-            heard = _bytes_of(device, baud)
+            heard = _bytes_of(device, baud, framing, wait_s, send)
         except PortError as error:
             return str(error), [], baud
         families = probe(heard) if heard else []
@@ -56,10 +67,16 @@ def listen(device: str, bauds: Sequence[int] = PROBED_BAUDS) -> tuple[str, list[
     return describe_bytes(heard), [], bauds[-1]
 
 
-def _bytes_of(device: str, baud: int) -> bytes:
+def _bytes_of(device: str, baud: int, framing: str, wait_s: float, send: bytes) -> bytes:
+    """Return what a port sends in a second, or until it is recognised within ``wait_s``."""
     clock, heard = SystemClock(), b""
-    with contextlib.closing(SerialPort(device, baud)) as port:
-        end_ns = clock.now_ns() + int(PROBE_S * 1e9)
-        while (left_ns := end_ns - clock.now_ns()) > 0:
-            heard += port.read(left_ns * 1e-9)
+    with contextlib.closing(SerialPort(device, baud, framing)) as port:
+        start_ns = second_ns = clock.now_ns()
+        while (now_ns := clock.now_ns()) < start_ns + int(max(PROBE_S, wait_s) * 1e9):
+            if now_ns >= second_ns:
+                if now_ns > start_ns and probe(heard):
+                    break
+                second_ns += int(PROBE_S * 1e9)
+                port.write(send)
+            heard += port.read((second_ns - now_ns) * 1e-9)
     return heard

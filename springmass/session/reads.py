@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from acquisition.block import Block
 from acquisition.decoders.decoder import Decoder
-from acquisition.events import Continued, Event, Lost, Reopened, Replaced
+from acquisition.events import Continued, Event, Lost, Reopened, Replaced, Shared
 from acquisition.live.decoding import SensorChain
 from acquisition.readings import NO_READINGS, Read, Reading
 from springmass.session.failures import Failures
@@ -67,6 +67,7 @@ class Tee:
         self._returns: dict[int, Return] = {}
         self._last: list[Reading | None] = [None for _ in chains]  # of each port
         self.gone: dict[int, str] = {}
+        self.shared: set[int] = set()  # ports that another program reads too
         self.readings = [0 for _ in chains]
         self.unshown = 0
 
@@ -112,6 +113,8 @@ class Tee:
             if isinstance(event, Lost):
                 self._settle(port)
                 self.gone[port] = event.why or ""
+            elif isinstance(event, Shared):
+                self.shared.add(port)
             elif isinstance(event, Reopened):
                 self.gone.pop(port, None)
                 if self._kept is not None:
@@ -219,6 +222,8 @@ class Tee:
             self._kept = None
             self._recorder, self._chains, self._parts = recorder, chains, not preview
             self._channels, self._begun = list(range(len(chains))), {port for port, _, _ in kept}
+            for port in sorted(self.shared):  # it was noticed before the run began
+                recorder.event(port, since_ns, Shared(port=self._sensors[port].port.name))
             recorder.reads(kept)
             for read in kept:
                 self._decode(read[0], read)

@@ -80,7 +80,7 @@ class OpenSensor:
 
     def not_heard(self, heard: bytes) -> ProgramError:
         """Return an error that describes what was received instead of readings."""
-        what = "not a byte came; is the sensor powered, its line on the right pin?"
+        what = "not a byte came; is the sensor powered, its line on the right pin, or does it wait for --send TEXT?"
         if heard:
             what = describe_bytes(heard, self.options if self.family.name == "text-lines" else None)
         wrong = f"{self.port.name}: a {self.family.name} sensor at {self.baud} baud was expected, {what}"

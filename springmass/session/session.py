@@ -21,6 +21,7 @@ import numpy as np
 
 from acquisition.block import Block
 from acquisition.clock import Clock
+from acquisition.decoders.registry import is_text
 from acquisition.events import Noted, RunEnded, Triggered, Zeroed
 from acquisition.live.calibration import StillPoint, against_ruler, from_still
 from acquisition.live.reader import PortLine, PortReader
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     from springmass.runs.run import Run
 
 HEAR_S = 3.0  # silence before a run after which the sensor counts as absent
+START_S = 12.0  # time that a board may take to start: Wi-Fi, calibration, a banner
 HEARD = 3  # number of readings after which a sensor counts as heard
 LOOK_FOR_MARKS_S, LOOK_FOR_TRIGGER_S = 0.2, 0.05
 HELD_BLOCKS = 1000  # maximum number of blocks kept for the display before the run begins
@@ -117,11 +119,14 @@ class Session:
         self._reader_failure: BaseException | None = None
         self._marks: list[tuple[int, str]] = []
 
-    def listen(self, say: Callable[[str], None] = lambda _: None) -> None:
+    def listen(
+        self, say: Callable[[str], None] = lambda _: None, wait_s: float | None = None, send: bytes = b""
+    ) -> None:
         """Start reading, and wait until every sensor has been heard; ``say`` gets lines about what they are.
 
         A sensor that is not heard after 3 s, or after five periods of a slow sensor, raises a ProgramError that
-        describes what was received instead.
+        describes what was received instead. A board that sent nothing, or text, has 12 s to start up. With ``wait_s``
+        every sensor has this time. ``send`` is sent each second until all are heard.
         """
         lines = [PortLine(x.port, port, x.family.poll, x.family.identify) for port, x in enumerate(self.sensors)]
         for each in lines:
@@ -131,16 +136,29 @@ class Session:
         self._reader.start()
         # A slow sensor can be distinguished from silence only after several of its periods.
         slowest = min(chain.timebase.rate_hz for chain in self._chains)
-        deadline = self._clock.now_ns() + int(max(HEAR_S, 5.0 / slowest) * 1e9)
+        start_ns = send_ns = self._clock.now_ns()
+        deadline = start_ns + int((wait_s or max(HEAR_S, 5.0 / slowest)) * 1e9)
+        longest = deadline if wait_s else max(deadline, start_ns + int(START_S * 1e9))
         while self._waits_for_word() or any(chain.decoder.undecided for chain in self._chains):
+            if send and self._clock.now_ns() >= send_ns and not all(self._tee.readings):
+                send_ns += SECOND_NS
+                for sensor in self.sensors:
+                    sensor.port.write(send)
             if self._clock.now_ns() > deadline:
+                if deadline < longest and (starting := self._starting()):
+                    deadline = longest
+                    say(f"{', '.join(starting)}: no reading yet; a board may need {START_S:g} s to start")
+                    continue
                 if (mute := next((i for i, count in enumerate(self._tee.readings) if count < HEARD), None)) is None:
                     break
                 self._end_unheard(mute)
             self._wait_until(self._clock.now_ns() + 50_000_000)
         for channel, chain in enumerate(self._chains):
-            if chain.decoder.counts:
+            if chain.decoder.refused:
                 self._end_unheard(channel)
+            if unit := chain.decoder.assumed_unit:
+                port = self.sensors[channel].port.name
+                say(f"{port}: no unit is printed, so the numbers are read as {unit}; add --option unit=mm if not")
             if (identity := chain.status.identity) is not None:
                 sensor = self.sensors[channel]
                 for line in meeting(sensor, identity):
@@ -154,10 +172,21 @@ class Session:
             for count, sensor, chain in zip(self._tee.readings, self.sensors, self._chains, strict=True)
         )
 
+    def _starting(self) -> list[str]:
+        """Return the ports of sensors without a reading, if all of these may start up: they send nothing, or text."""
+        mute = [port for port, count in enumerate(self._tee.readings) if count < HEARD]
+        if any(port in self._tee.gone or self.sensors[port].family.poll is not None for port in mute):
+            return []
+        starts = all(not heard or is_text(heard) for heard in map(self._tee.heard, mute))
+        return [self.sensors[port].port.name for port in mute if starts]
+
     def _end_unheard(self, channel: int) -> None:
         self.stop()
         if channel in self._tee.gone:
             raise ProgramError(self._tee.gone[channel], "is a sensor connected, and is this its port?", SENSOR)
+        if channel in self._tee.shared:
+            problem = f"{self.sensors[channel].port.name}: another program reads this port"
+            raise ProgramError(problem, "close that program", SENSOR)
         raise self.sensors[channel].not_heard(self._tee.heard(channel))
 
     def still(self, seconds: float = 3.0) -> StillPoint:

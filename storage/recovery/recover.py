@@ -60,7 +60,7 @@ class PartReader:
         facts = {
             "info": self.chain.info(self.sensor.port, header.kind),
             "title": header.title,
-            "traps": (*_traps(damage), *losses.traps()),
+            "traps": (*_traps(damage), *losses.traps(), *_restarts(decoding)),
             "malformed_rows": sum(n for name, n in decoding["faults"].items() if not name.endswith("bytes")),
             "format": "wire",
         }
@@ -86,6 +86,13 @@ def _traps(damage: Damage) -> Iterator[FormatIssue]:
         yield FormatIssue("cut_short", "The recording was cut short; everything in its log is here.")
 
 
+def _restarts(decoding: Mapping[str, Any]) -> Iterator[FormatIssue]:
+    if silences := decoding["restart_silences_s"]:
+        often = "once" if len(silences) == 1 else f"{len(silences)} times"
+        longest = f"{max(silences):.3g} s without readings"
+        yield FormatIssue("sensor_restarted", f"The sensor restarted {often}, after {longest}.", len(silences))
+
+
 RUNS_PER_PASS = 4
 """Maximum number of run files written in one pass over the log; each needs some megabytes of memory."""
 SHORTEST_PART_S = 10.0
@@ -99,6 +106,7 @@ def recover(
     overwrite: bool = False,
     remove_log: bool = False,
     speed_of_sound_m_per_s: float | None = None,
+    options: Mapping[str, Any] | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> RecoverReport:
     """Build the run files of a log, which may be finished, cut short or damaged.
@@ -106,6 +114,8 @@ def recover(
     The run file has the log's name with the suffix ``.h5``, or the name ``out_path``. With several sensors the channel
     comes before the suffix: ``run.0.h5``, ``run.1.h5``. Later parts of a sensor are ``run.part2.h5`` or
     ``run.0.part2.h5``. ``provenance`` becomes part of the provenance in the run files.
+
+    ``options`` replace those of the decoders in the log, so that bytes can be read in another way.
 
     The log is removed with ``remove_log``, after every run file has been read back and contains the whole log.
 
@@ -121,12 +131,13 @@ def recover(
         raise LogGrowing(contents.path, problem, "recover it after the recording has ended")
     survey = _survey_of(contents)
     sensors = [_calibrated(sensor, survey, speed_of_sound_m_per_s) for sensor in survey.header.sensors]
+    sensors = [replace(sensor, options={**sensor.options, **(options or {})}) for sensor in sensors]
     out = contents.path if out_path is None else Path(out_path)
     paths = _paths(out, survey)
     runs: dict[Path, RecoveredRun] = {}
     sha256 = contents.sha256()
     occupied = [path for path in paths.values() if not overwrite and os.path.lexists(path)]
-    for path in [] if speed_of_sound_m_per_s is not None else occupied.copy():
+    for path in [] if options or speed_of_sound_m_per_s is not None else occupied.copy():
         if (existing := _existing_run(path, contents, sha256)) is not None:
             occupied.remove(path)
             runs[path] = existing

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from acquisition.block import Block, Flag
-from acquisition.events import Continued, Dropped, Event, Lost, Reopened
+from acquisition.events import Continued, Dropped, Event, Lost, Reopened, Shared
 from acquisition.recordings.recording import FormatIssue
 from storage.wire_log.records import SensorEntry
 from storage.wire_log.scanning import Damage
@@ -33,7 +33,7 @@ class Losses:
     follows. ``why`` is the reason for the loss of the port, empty if the port was present but silent. ``away`` has the
     duration of each interruption of a network port within the run, s. ``another`` says why the run is of another
     sensor than the part before it. ``no_target_s`` and ``longest_no_target_s`` are the total and the longest time
-    during which the sensor answered without a distance, s.
+    during which the sensor answered without a distance, s. ``shared`` says that another program read the port too.
     """
 
     seconds: float
@@ -45,6 +45,7 @@ class Losses:
     longest_no_target_s: float = 0.0
     dropped_reads: int = 0
     dropped_bytes: int = 0
+    shared: bool = False
 
     def traps(self) -> Iterator[FormatIssue]:
         """Yield a trap for each kind of loss."""
@@ -63,6 +64,8 @@ class Losses:
                 f"{sum(self.away):.3g} s in total were not recorded.",
                 len(self.away),
             )
+        if self.shared:
+            yield FormatIssue("port_shared", "Another program read the sensor's port too, so bytes are missing.")
         if self.another:
             yield FormatIssue("sensor_replaced", f"Another sensor was plugged in before this part ({self.another}).")
         if self.longest_no_target_s >= NO_TARGET_S:
@@ -133,6 +136,7 @@ class LossCount:
             another=another[0] if another else "",
             no_target_s=self._total,
             longest_no_target_s=self._longest,
+            shared=any(isinstance(event, Shared) for _, event in events),
             dropped_reads=sum(event.records or 0 for event in overflows),
             dropped_bytes=sum(event.bytes or 0 for event in overflows),
         )

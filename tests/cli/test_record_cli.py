@@ -252,8 +252,9 @@ def test_the_simulated_bob_hangs_still_until_its_rest_is_measured(cli: Cli, tmp_
 
 
 def test_silence_ends_a_recording_before_it_starts(cli: Cli, tmp_path: Path, silent_port: str) -> None:
-    """After three seconds a line says what to check; it ends with 4 and leaves no file."""
-    done = cli("record", "--port", silent_port, "--sensor", "line-protocol", "-o", tmp_path / "run.h5")
+    """After the stated seconds a line says what to check; it ends with 4 and leaves no file."""
+    named = ("--port", silent_port, "--sensor", "line-protocol", "--wait", "3")
+    done = cli("record", *named, "-o", tmp_path / "run.h5")
     assert done.code == 4
     (line,) = done.err.splitlines()
     assert silent_port in line

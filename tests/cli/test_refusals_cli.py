@@ -23,7 +23,7 @@ LINES: list[tuple[tuple[str, ...], str]] = [
     (("analyse", "--json", RUN, "--from", "20"), "9.99"),
     (("analyse", "--json", RUN, "--to", "-1"), "9.99"),
     (("analyse", "--json", RUN, "--from", "5", "--to", "4"), "9.99"),
-    (("analyse", "--json", RUN, "--mass-kg", "200 g"), "--mass-kg"),
+    (("analyse", "--json", RUN, "--mass-kg", "200 q"), "--mass-kg"),
     (("analyse", "--json", RUN, "--mass-kg", "0.2+/--0.1"), "--mass-kg"),
     (("analyse", "--json", RUN, "--mass-kg", "-1"), "mass_kg"),
     (("analyse", "--json", RUN, "--set", "bob.mass=0.2"), "mass_kg"),

@@ -31,6 +31,7 @@ class Case:
 
 hexed = bytes.fromhex
 NO_FFHLS = (hexed("ff0000ff"), hexed("fffffdfb"), hexed("fffffefc"))
+NO_LIDAR = (hexed("5959ffff2c05180a03"), hexed("59591b006300180a52"), hexed("59591b00ffff180aed"))
 COLUMNS = {"unit": "mm", "column": 2, "separator": ";", "sequence": 0, "time": 1, "temperature": 3}
 NAMES = {"unit": "in", "column": "d", "time": "t", "time_unit": "ms"}
 
@@ -48,6 +49,8 @@ CASES = [
     Case(
         "sen0149", 0.001, "detected", known={hexed("55aa110202 1234 5a"): 4.66}, no_target=(hexed("55aa110202ffff12"),)
     ),
+    Case("tfmini", 0.01, "detected", known={hexed("59591b002c05180a20"): 0.27}, no_target=NO_LIDAR),
+    Case("tfmini", 0.001, "detected", {"unit": "mm"}, known={hexed("59590d012c05180a13"): 0.269}),
     Case("text-lines", 1e-6, "unseen", known={b"123.4\n": 1.234}, no_target=(b"0\r\n", b"-1\n")),
     Case("text-lines", 1e-6, "unseen", {"unit": "us"}, no_target=(b"0\n", b"38000\n")),
     Case("text-lines", 1e-6, "unseen", COLUMNS, known={b"7;70000;253;21.5\r\n": 0.253}),

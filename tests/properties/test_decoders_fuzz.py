@@ -33,9 +33,9 @@ def windows(data: bytes, size: int) -> Iterable[bytes]:
     return (data[i : i + size] for i in range(len(data) - size + 1))
 
 
-def summed(data: bytes, size: int, value: int, unit_m: float) -> set[float]:
-    """Return the distances of every window whose last byte is the sum of the others."""
-    sound = (w for w in windows(data, size) if sum(w[:-1]) % 256 == w[-1])
+def summed(data: bytes, size: int, value: int, unit_m: float, first: int = 0) -> set[float]:
+    """Return the distances of every window whose last byte is the sum of the others, from ``first`` on."""
+    sound = (w for w in windows(data, size) if sum(w[first:-1]) % 256 == w[-1])
     return {int.from_bytes(w[value : value + 2], "big") * unit_m for w in sound}
 
 
@@ -55,7 +55,7 @@ def sealed_lines(data: bytes) -> set[float]:
 def whole_lines(data: bytes) -> set[float]:
     """Return every number, in m, cm, mm and inches, of every line that is ended and was begun after another."""
     numbers = set()
-    for line in data.split(b"\n")[1:-1]:
+    for line in re.split(rb"\n|\r|\*/", data)[1:-1]:
         for run in re.findall(rb"[-+.,\deE]+", line):
             within = re.findall(rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", run)
             for text in (run.replace(b",", b"."), *run.split(b","), *within):
@@ -72,10 +72,13 @@ ORACLES: dict[str, Callable[[bytes], set[float]]] = {
     "maxbotix-xl-long": r_lines(4, 0.01),
     "maxbotix-hr": r_lines(4, 0.001),
     "maxbotix-wr": r_lines(4, 0.001),
-    "ffhls": lambda data: summed(data, 4, 1, 0.001),
+    "ffhls": lambda data: summed(data, 4, 1, 0.001) | summed(data, 4, 1, 0.001, first=1),
     "us100": lambda data: {int.from_bytes(w, "big") * 0.001 for w in windows(data, 2)},
     "urm37": lambda data: summed(data, 4, 1, 0.01),
     "sen0149": lambda data: summed(data, 8, 5, 0.001),
+    "tfmini": lambda data: {
+        int.from_bytes(w[2:4], "little") * 0.01 for w in windows(data, 9) if w[8] == sum(w[:8]) & 0xFF
+    },
     "text-lines": whole_lines,
 }
 

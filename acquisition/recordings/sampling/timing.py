@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from acquisition.block import B1, F8, I8
 from acquisition.errors import FormatError, NeedsAnswer
+from acquisition.live.clock_fit import NANO, fit_clock
 from acquisition.recordings.questions import Missing, MissingItem, Question
 from acquisition.recordings.recording import FormatIssue
 
@@ -31,7 +32,7 @@ class Timing(NamedTuple):
     """The times ``origin_s + i / rate_hz`` of samples i; without an origin they fit no grid and are used as printed.
 
     ``by_row`` says that times computed from row numbers are better than the printed times. ``traps`` say how the times
-    were obtained.
+    were obtained. ``u_rate`` is the relative standard uncertainty of a rate that follows from arrivals.
     """
 
     rate_hz: float
@@ -39,6 +40,7 @@ class Timing(NamedTuple):
     resolution_s: float = 0.0
     by_row: bool = False
     traps: tuple[FormatIssue, ...] = ()
+    u_rate: float | None = None
 
     def steps(self, t: Any) -> Any:
         """Return a time, or an array of times, as numbers of steps from the origin."""
@@ -271,7 +273,8 @@ def _in_bursts(path: str, t: F8, resolution: float, rate_hz: float | None) -> Ti
 
     A computer that polls a sensor, or gets its samples in packets, stamps each sample when it arrives. The stamps of
     one packet lie close together and contain no information on when its samples were taken. The stamps of the last
-    samples of the packets do: a straight line fitted to them against the row numbers gives the rate and the start.
+    samples of the packets do, compared with the row numbers as the clocks of a sensor and a computer are: this gives
+    the rate with its uncertainty.
     """
     if t.size < 2 * _FEWEST_BURSTS or not np.isfinite(t).all():
         return None
@@ -297,6 +300,11 @@ def _in_bursts(path: str, t: F8, resolution: float, rate_hz: float | None) -> Ti
     # Samples are missing if the last stamp of a burst is further than one interval from its evenly spaced time.
     if rate_hz is None and np.abs(t[last] - (start + step * last)).max() >= interval:
         raise NeedsAnswer(Question(path, (rate_needed(),), reason=f"the times come in {bursts}, some missing"))
+    fit, u_rate = fit_clock(np.asarray(step * last, np.float64), np.rint(t[last] / NANO).astype(np.int64)), None
+    if rate_hz is None and math.isfinite(fit.u_rate_error_ppm):
+        step, u_rate = step / (1.0 + 1e-6 * fit.rate_error_ppm), 1e-6 * fit.u_rate_error_ppm
+        start = float(np.mean(t[last] - step * last))
     rate = rate_hz or 1.0 / step
     message = f"the times come in {bursts}; the samples were spread evenly, at {rate:.6g} Hz"
-    return Timing(rate, start, resolution, by_row=True, traps=(FormatIssue("times_in_bursts", message),))
+    traps = (FormatIssue("times_in_bursts", message),)
+    return Timing(rate, start, resolution, by_row=True, traps=traps, u_rate=u_rate)

@@ -55,7 +55,9 @@ class Samples:
         return Recording(
             format=family,
             path=self.path,
-            info=SourceInfo(kind, name, self.timing.rate_hz, None, self.quantum, clock, self.error_m),
+            info=SourceInfo(
+                kind, name, self.timing.rate_hz, None, self.quantum, clock, self.error_m, self.timing.u_rate
+            ),
             channel=column.name,
             samples=block,
             traps=(*self.traps, *more),

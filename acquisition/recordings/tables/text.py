@@ -11,6 +11,7 @@ import numpy as np
 
 from acquisition.block import I8
 from acquisition.errors import FormatError
+from acquisition.line_numbers import uncoloured
 from acquisition.recordings.tables.numbers import plain
 
 HEAD_BYTES = 8192
@@ -22,6 +23,7 @@ _FOREIGN = re.compile(rb"[\x80-\xff]+[\x21-\x7e]?")
 _HANZI = re.compile(rb"(?:[\xb0-\xd7\xa1-\xa3][\xa1-\xfe])+[\x21-\x7e]?")
 """Common Chinese characters in GB 2312; in cp1252 these codes are capitals with accents, which rarely come in pairs."""
 _NUMBER = re.compile(rb"[\s,;]*[-+]?[.,]?\d")
+_LOG = re.compile(rb"^[EWIDV] \(\d{1,10}\) ", re.MULTILINE)
 _ZIP = b"PK\x03\x04"
 _PAGE_BYTES = 1 << 16
 _HEAD_SPAN = 1 << 16
@@ -43,6 +45,7 @@ class Text:
         """Return the text of a file's bytes."""
         if encoding := _utf16(data[:HEAD_BYTES]):
             data = data.decode(encoding, errors="replace").removeprefix("\ufeff").encode("utf-8", "replace")
+        data = _uncoloured(data)
         if not data.isascii() and (numbered := plain(printed := decode(data))) != printed:
             data = numbered.encode("utf-8", "replace")
         whole = data.rstrip(b"\0\x1a") if data[-1:] in (b"\0", b"\x1a") else data
@@ -143,8 +146,15 @@ def is_text(data: bytes) -> bool:
         return False
     if _utf16(head):
         return True
-    head = head.rstrip(b"\0") or head
+    head = _uncoloured(head.rstrip(b"\0") or head)
     return len(head) - len(head.translate(None, _CONTROL)) <= 0.02 * len(head)
+
+
+def _uncoloured(data: bytes) -> bytes:
+    """Return a log of a terminal or of ESP-IDF as its lines are read from a port."""
+    if b"\x1b[" not in data and not _LOG.search(data[:HEAD_BYTES]):
+        return data
+    return uncoloured(data.decode("latin-1")).encode("latin-1")
 
 
 def decode(data: bytes) -> str:
@@ -184,7 +194,9 @@ def _utf16(head: bytes) -> str:
 
 def head_lines(head: bytes) -> list[str]:
     """Return the lines of the first bytes of a file; one empty line if the file is binary."""
-    return plain(decode(head)).replace("\r\n", "\n").replace("\r", "\n").split("\n") if is_text(head) else [""]
+    if not is_text(head):
+        return [""]
+    return plain(decode(_uncoloured(head))).replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
 def says_simulated(text: str) -> bool:

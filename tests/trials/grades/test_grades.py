@@ -19,10 +19,7 @@ WRONG_KINDS = {
     "radial-acceleration", "magnet-pendulum", "driven", "mains-hum", "leaking-mass", "frame-rate", "pendulum-position",
     "pendulum-gyro", "cantilever-overtone",
 }  # fmt: skip
-WRONG_FILES = WRONG_KINDS - {"cantilever-overtone", "close-modes", "turning-plane"} | {
-    "strong-creep",
-    "autocorrelation",
-}
+WRONG_FILES = WRONG_KINDS - {"cantilever-overtone", "close-modes", "turning-plane"} | {"strong-creep"}
 
 pytestmark = pytest.mark.trials
 

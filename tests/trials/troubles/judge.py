@@ -15,6 +15,7 @@ from pipeline.analyse import Analysis, Oscillation, Relaxation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError
 from pipeline.options import options_for
+from pipeline.results.derive import Derived
 from pipeline.track import Track
 from springmass.loading.options import AnalysisOptions
 from springmass.runs.run import Run
@@ -116,12 +117,8 @@ def _analysed(record: Record, tier: str) -> Analysis:
 
 
 def _held_against(analysis: Analysis, record: Record) -> dict[str, Given]:
-    begin, motion = _beginning(analysis), analysis.motion
-    if isinstance(motion, Oscillation):
-        own = motion.derived.statistical
-        held = _held_coefficients(motion, record, begin)
-    else:
-        own, held = analysis.estimates, {}
+    begin, own = _beginning(analysis), analysis.derived.statistical
+    held = _held_coefficients(analysis.derived, record, begin)
     for name, truth in record.truth.items():
         stated = analysis.estimates.get(name)
         if stated is not None:
@@ -132,9 +129,8 @@ def _held_against(analysis: Analysis, record: Record) -> dict[str, Given]:
     return held
 
 
-def _held_coefficients(motion: Oscillation, record: Record, begin: float) -> dict[str, Given]:
+def _held_coefficients(derived: Derived, record: Record, begin: float) -> dict[str, Given]:
     """The coefficients that may be quoted, and their law if it lacks a term of the true one that matters."""
-    derived = motion.derived
     true = {name: _at(record.truth[name], begin) for name in record.truth if name in COEFFICIENTS}
     if not (derived.quoted and true):
         return {}
@@ -146,7 +142,7 @@ def _held_coefficients(motion: Oscillation, record: Record, begin: float) -> dic
         if name in derived.coefficients
     }
     if "c" not in true:
-        size = motion.derived.estimates["amplitude"].value
+        size = derived.estimates["amplitude"].value
         rates = {"mu": true["mu"] / size, "gamma": true["gamma"], "beta": true["beta"] * size}
         missing = sum(rate for name, rate in rates.items() if name not in derived.coefficients)
         if missing > MISSED * sum(rates.values()):
@@ -163,10 +159,7 @@ def _beginning(analysis: Analysis) -> float:
 
     It is the first sample, unless a finding says that a part is left out.
     """
-    if isinstance(analysis.motion, Oscillation):
-        return analysis.motion.phase.t0
-    if isinstance(analysis.motion, Relaxation):
-        return analysis.motion.start_s
     said = any(finding.code in LEAVES_OUT for finding in analysis.findings)
-    usable = analysis.samples.used if said else np.isfinite(analysis.track.y)
-    return float(analysis.track.t[np.flatnonzero(usable)[0]])
+    if said or isinstance(analysis.motion, Oscillation | Relaxation):
+        return analysis.motion.start_s
+    return float(analysis.track.t[np.flatnonzero(np.isfinite(analysis.track.y))[0]])

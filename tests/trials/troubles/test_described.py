@@ -34,10 +34,6 @@ class Failure(NamedTuple):
 
 QUOTED = "a law counts as the only one although a richer one was dearer alone: its coefficients are off"
 REFUSED = "a fit that is right is refused, because an average of samples has less noise between neighbours"
-NO_CLOCK = "the rate of the sensor's clock is not applied"
-NO_SCALE = "the uncertainty of the scale of sound is not applied"
-LEFT_OUT = "a beginning is left out without a finding, and the amplitudes are of its end"
-NOISE = "u of the noise is that of a standard deviation, and the estimate is a median"
 
 FAILURES: Mapping[str, Failure] = {
     "friction: stops the bob, 1 mm/s": Failure(QUOTED, 14),
@@ -51,17 +47,6 @@ FAILURES: Mapping[str, Failure] = {
         for ratio in (0.05, 0.1, 0.145, 0.2, 0.3)
         if (size, ratio) != (4, 0.05)
     },
-    "fast clock: ratio 0.05": Failure(NO_CLOCK, 3),
-    **{f"fast clock: ratio {ratio:g}": Failure(NO_CLOCK) for ratio in (0.1, 0.145, 0.2)},
-    "fast clock: ratio 0.3": Failure(NO_CLOCK, 2),
-    "relaxation: ratio 1, fast clock": Failure(NO_CLOCK),
-    "relaxation: ratio 1.6, fast clock": Failure(NO_CLOCK),
-    "relaxation: ratio 1.6, air not stated": Failure(NO_SCALE),
-    "two modes: ratio 1.06": Failure(LEFT_OUT, 13),
-    "two modes: ratio 1.06, for a minute": Failure(LEFT_OUT),
-    "two modes: ratio 1.06, fast clock": Failure(NO_CLOCK),
-    "two modes: ratio 1.5": Failure(NOISE, 17),
-    "still bob: air not stated": Failure(NO_SCALE),
 }
 
 
@@ -96,10 +81,9 @@ def test_what_is_stated_is_right_and_no_fit_is_refused(kind: Kind) -> None:
 
 
 NOISY = ("damped: ratio 0.02", "relaxation: ratio 1.6", "two modes: ratio 1.5", "still bob")
-NOISE_FAILURES = {name: Failure(NOISE) for name in ("two modes: ratio 1.5", "still bob")}
 
 
-@pytest.mark.parametrize("kind", _cases({name: NAMED[name] for name in NOISY}, NOISE_FAILURES))
+@pytest.mark.parametrize("kind", [pytest.param(NAMED[name], id=name) for name in NOISY])
 def test_the_noise_scatters_by_its_u(kind: Kind) -> None:
     """Over many records the error of the noise is about as large as its u says."""
     given = [try_one(kind, seed, "standard").given["noise"] for seed in range(NOISES)]

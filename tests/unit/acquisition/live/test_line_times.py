@@ -14,7 +14,7 @@ from pipeline.analyse import analyse
 from springmass import load
 from springmass.loading.track import to_track
 from storage.run_file.writing import run_writer
-from tests.adapters import NOISE_M, PERIOD_S, U_CRYSTAL, Adapter, delivered
+from tests.adapters import NOISE_M, PERIOD_S, U_CRYSTAL, Adapter, bob_m, delivered
 
 UNUSED = np.uint8(Flag.DUPLICATE_TIME | Flag.NON_MONOTONIC_TIME)
 
@@ -86,3 +86,19 @@ def test_a_run_file_of_an_earlier_version_gets_the_better_times(tmp_path: Path) 
     np.testing.assert_allclose(run.loaded.samples.t, settled.t, atol=1e-9)
     assert not run.loaded.samples.flags.any()
     assert run.loaded.info.u_rate == chain.info("port").u_rate
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_stamps_of_arrival_in_a_file_give_a_rate_with_its_uncertainty(tmp_path: Path, seed: int) -> None:
+    """Bursts of twelve that come 20 ms late on average leave a rate that is known to about 100 ppm, and u says so."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(1500) / 50.0
+    last = np.minimum(np.arange(t.size) // 12 * 12 + 11, t.size - 1)
+    late_s = rng.exponential(0.02, t.size // 12 + 1)[np.arange(t.size) // 12]
+    stamps = np.maximum.accumulate(t[last] + late_s) + 1e-4 * (np.arange(t.size) % 12)
+    rows = "".join(f"{stamp:.4f},{100 * x:.2f}\n" for stamp, x in zip(stamps, bob_m(t), strict=True))
+    (tmp_path / "bursts.csv").write_text(f"Time (s),Distance (cm)\n{rows}")
+    info = load(tmp_path / "bursts.csv").loaded.info
+    assert info.u_rate is not None
+    assert abs(info.rate_hz / 50.0 - 1.0) < 4.0 * info.u_rate
+    assert info.u_rate < 3e-4

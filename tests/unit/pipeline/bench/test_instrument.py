@@ -79,3 +79,13 @@ def test_impossible_uncertainties_are_refused(wrong: dict[str, float]) -> None:
     """Missing, negative or no numbers: one line, and no result."""
     with pytest.raises(TrackError, match=r"uncertainty that is not negative|finite and not negative"):
         Instrument.of(track(1, **wrong))
+
+
+def test_a_stated_clock_replaces_what_is_assumed() -> None:
+    """A calibration corrects every time; a bound has the u of a rectangle, where no comparison contradicts it."""
+    calibrated = Instrument.of(track(30, clock_rate=(5e-3, 1e-6), rate_error=1e-3, u_rate_error=1e-5))
+    assert calibrated.clock_rate.value == 1.005
+    assert calibrated.clock_rate.u == 1e-6
+    bound = Instrument.of(track(30, clock_limit=2e-4, u_clock=2e-4 / ROOT3))
+    assert (bound.clock_rate.value, bound.clock_rate.u) == (1.0, 2e-4 / ROOT3)
+    assert Instrument.of(track(30, clock_limit=2e-4, u_clock=1e-4, rate_error=9e-3, u_rate_error=1e-5)).clock_refused

@@ -150,3 +150,19 @@ def test_equal_constants_hardly_ever_disagree_by_hookes_law(count: int) -> None:
         position_m = 0.3 + rng.normal(9.81, 0.015) / 14.0 * mass_kg + 1e-3 * rng.standard_normal(count)
         apart += hooke(mass_kg, position_m).normalised_error(Estimate(rng.normal(14.0, 0.01), 0.01, "N/m")) > 1.0
     assert apart <= 500 * (0.0455 + 3.3 * math.sqrt(0.9545 * 0.0455 / 500))
+
+
+@pytest.mark.parametrize("kind", ["a line", "an initial tension", "stretched too far"])
+def test_hookes_law_takes_the_straight_part(kind: str) -> None:
+    """A coiled spring is closed at first, one stretched too far becomes softer; k is that of the part between."""
+    rng = np.random.default_rng(5)
+    force = np.linspace(0.0, 2.0, 12)
+    extension = {
+        "a line": force / 14.0,
+        "an initial tension": np.maximum(force - 0.6, 0.0) / 14.0,
+        "stretched too far": np.maximum(force / 14.0, 1.4 / 14.0 + (force - 1.4) / 7.0),
+    }[kind]
+    found = hooke(force, 0.8 - extension + 3e-4 * rng.standard_normal(force.size), "N")
+    assert abs(found.constant.value - 14.0) < 3.0 * found.constant.u < 0.6
+    assert found.straight.all() == (kind == "a line") == (not found.bend)
+    assert kind == "a line" or ("tension" in found.bend) == (kind == "an initial tension")

@@ -32,7 +32,9 @@ WRONG: dict[str, Callable[[Path], Any]] = {
     "too few samples": lambda _: sm.analyse((T[:3], T[:3])),
     "crests cut off in every period": lambda _: sm.analyse((5.0 * T[:60], np.minimum(FEW, 0.0792))),
     "times that run backwards": lambda _: sm.analyse((T[::-1], RUN[1])),
-    "times under another name": lambda _: sm.analyse(xr.DataArray(RUN[1], {"t": RUN[0]}, ["t"])),
+    "two times under other names": lambda _: sm.analyse(
+        xr.DataArray(RUN[1], {"t": ("row", RUN[0]), "s": ("row", RUN[0])}, ["row"])
+    ),
     "no array": lambda _: sm.analyse(3),  # type: ignore[arg-type]
     "a range without samples": lambda _: sm.analyse(RUN, from_s=99.0),
     "no scene for a simulation": lambda _: sm.simulate(None, T),  # type: ignore[arg-type]

@@ -1,0 +1,79 @@
+"""Whether the values of a scene are those of a bench, by what each does; a slip of the unit is named with readings."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from pipeline.bench.disc import added_mass_kg
+from pipeline.bench.scene import BENCH_KEYS, Scene
+from pipeline.bench.spring import GRAVITY_M_PER_S2
+from pipeline.bench.typed import readings
+from pipeline.numerics.estimate import Estimate
+
+USUAL: dict[str, tuple[float, float]] = {
+    "bob_mass_kg": (1e-3, 20.0),
+    "pendulum_length_m": (0.01, 100.0),
+    "disc_diameter_m": (0.0, 1.0),
+    "air_temperature_c": (-30.0, 50.0),
+    "air_pressure_pa": (5e4, 1.1e5),
+    "sensor_sigma_m": (0.0, 0.05),
+    "sensor_lag_s": (0.0, 1.0),
+    "start_displacement_m": (-2.0, 2.0),
+    "start_velocity_m_per_s": (-10.0, 10.0),
+}
+"""Values of a bench: from the lowest to the highest pressure at which people live; distances and speeds of a hall."""
+AIR_SHARE = 0.5  # of the bob's mass that may swing along as air; a disc of 30 cm on 0.1 kg has 11 %
+SPRING_BOBS = 5.0  # bobs that a spring may weigh
+LONGEST_SAG_M = 10.0  # the longest range of a rangefinder (MaxBotix XL-MaxSonar)
+DECIDING = 20.0  # ratio of two readings above which a slip would decide the results; an inch is 2.5 cm
+
+
+class Slip(NamedTuple):
+    """A value that is perhaps a slip: in words, which end in both readings of its number if there are two."""
+
+    clause: str  # without a full stop, but with a question mark
+    asks: bool
+    decides: bool  # whether the readings differ so much that no result from this value can be sound
+
+
+def slips(scene: Scene) -> tuple[Slip, ...]:
+    """Return the values that are perhaps slips, and those that are no larger than their uncertainties.
+
+    >>> [slip.clause for slip in slips(Scene(disc_diameter_m=10.2))]
+    ['[disc] diameter_m = 10.2 is larger than a bench: 10.2 m or 10.2 cm?']
+    """
+    found = []
+    for (table, key), quantity in BENCH_KEYS.items():
+        estimate: Estimate | None = getattr(scene, quantity.attribute)
+        if estimate is None:
+            continue
+        name, value = f"[{table}] {key} = {estimate.value:g}", estimate.value
+        usual, effect = _usual(scene, quantity.attribute)
+        if not usual[0] <= value <= usual[1]:
+            others = [each for each in readings(value, quantity.unit, usual) if each.unit != quantity.unit]
+            asked = f": {value:g} {quantity.unit} or {value:g} {others[0].unit}?" if others else ""
+            decides = not others or not 1.0 / DECIDING < others[0].ratio < DECIDING
+            beyond = f"is beyond {usual[0]:g} to {usual[1]:g} {quantity.unit}"
+            found.append(Slip(f"{name} {effect or beyond}{asked}", bool(asked), decides))
+        if quantity.least > 0.0 and estimate.u >= value:
+            wide = f"{name} has an uncertainty as large as the value, u = {estimate.u:g}"
+            found.append(Slip(wide, asks=False, decides=True))
+    return tuple(found)
+
+
+def _usual(scene: Scene, attribute: str) -> tuple[tuple[float, float], str]:
+    """Return the usual range of a value beside the others of its scene, and what a value beyond it would do."""
+    bob, low, high = scene.bob_mass_kg, *USUAL.get(attribute, (-math.inf, math.inf))
+    if attribute == "disc_diameter_m" and scene.disc_diameter_m is not None:
+        if bob is not None and (air := added_mass_kg(scene)) > AIR_SHARE * bob.value:
+            # The air that a disc carries along grows with the third power of its diameter.
+            most = scene.disc_diameter_m.value * (AIR_SHARE * bob.value / air) ** (1.0 / 3.0)
+            return (low, min(high, most)), f"would carry along {air:.3g} kg of air, with a bob of {bob.value:.3g} kg"
+        return (low, high), "is larger than a bench"
+    if attribute == "spring_mass_kg" and bob is not None:
+        return (0.0, SPRING_BOBS * bob.value), f"is a spring heavier than {SPRING_BOBS:g} bobs"
+    if attribute == "spring_constant_n_per_m" and bob is not None:
+        softest = bob.value * GRAVITY_M_PER_S2 / LONGEST_SAG_M
+        return (softest, high), f"is a spring that the bob would stretch by more than {LONGEST_SAG_M:g} m"
+    return (low, high), ""

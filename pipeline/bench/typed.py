@@ -1,0 +1,130 @@
+"""A value as a person types it, in the unit that a scale or a barometer shows: 217.6 g, 10.2 cm, 1005 hPa, 21 °C."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+from pipeline.numerics.estimate import Estimate
+
+
+class Scale(NamedTuple):
+    """What a unit is in SI: ``factor`` times the number, plus ``zero``."""
+
+    factor: float
+    zero: float = 0.0
+
+
+# Pound, inch and atmosphere are exact by definition; the pressure of mercury is that of NIST SP 811, appendix B.
+SCALES: dict[str, dict[str, Scale]] = {
+    "kg": {
+        "kg": Scale(1.0),
+        "g": Scale(1e-3),
+        "mg": Scale(1e-6),
+        "lb": Scale(0.45359237),
+        "oz": Scale(0.45359237 / 16),
+    },
+    "m": {
+        "m": Scale(1.0),
+        "cm": Scale(1e-2),
+        "mm": Scale(1e-3),
+        "um": Scale(1e-6),
+        "in": Scale(0.0254),
+        "ft": Scale(0.3048),
+    },
+    "N/m": {"N/m": Scale(1.0), "N/cm": Scale(1e2), "N/mm": Scale(1e3), "mN/mm": Scale(1.0), "mN/m": Scale(1e-3)},
+    "degC": {
+        "degC": Scale(1.0),
+        "C": Scale(1.0),
+        "K": Scale(1.0, -273.15),
+        "degF": Scale(5.0 / 9.0, -160.0 / 9.0),
+        "F": Scale(5.0 / 9.0, -160.0 / 9.0),
+    },
+    "Pa": {
+        "Pa": Scale(1.0),
+        "hPa": Scale(1e2),
+        "mbar": Scale(1e2),
+        "kPa": Scale(1e3),
+        "bar": Scale(1e5),
+        "mmHg": Scale(133.3224),
+        "Torr": Scale(101325.0 / 760.0),
+        "inHg": Scale(3386.389),
+        "atm": Scale(101325.0),
+    },
+    "": {"%": Scale(1e-2)},
+    "s": {"s": Scale(1.0), "ms": Scale(1e-3), "us": Scale(1e-6)},
+    "m/s": {"m/s": Scale(1.0), "cm/s": Scale(1e-2), "mm/s": Scale(1e-3)},
+}
+"""The units in which a value may be typed, by the unit of its key; a key of any other unit takes that one alone."""
+
+_SIGNS = str.maketrans({"\u2212": "-", "\u2013": "-", "µ": "u", "μ": "u", "\u00a0": " ", "\u202f": " "})
+_FLOAT = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_TYPED = re.compile(rf"(\(?\s*{_FLOAT}(?:\(\d*\.?\d+\))?(?:\s*(?:\+/-|\+-|±)\s*{_FLOAT})?\s*\)?)\s*(\S.*)?")
+
+
+def scales_of(unit: str) -> dict[str, Scale]:
+    """Return the units in which a value of this unit may be typed."""
+    return SCALES.get(unit) or {unit: Scale(1.0)}
+
+
+def typed(text: str, unit: str) -> Estimate:
+    """Return the value that was typed, in this unit; without a unit of its own it is in this unit.
+
+    Raises
+    ------
+    ValueError
+        If the text is no number, or its unit is none of :func:`scales_of`.
+
+    Examples
+    --------
+    >>> typed("217.6 g", "kg"), typed("10.2+/-0.1 cm", "m"), typed("1005(1) hPa", "Pa"), typed("21 °C", "degC")
+    (0.2176 kg, 0.1020(10) m, 1.0050(10)e+05 Pa, 21 degC)
+    """
+    from uncertainties import ufloat_fromstr
+    from uncertainties.core import NegativeStdDev
+
+    match = _TYPED.fullmatch(text.translate(_SIGNS).strip())
+    if match is None:
+        raise ValueError("must be a number, with its standard uncertainty as 0.2007+/-0.0001 or 0.2007(1)")
+    if (match[2] or "").startswith(","):
+        raise ValueError("must be a number with a decimal point and not a comma")
+    number, own = match[1], (match[2] or "").replace("°", "").replace(" ", "")
+    scales = {name.replace(" ", ""): scale for name, scale in scales_of(unit).items()} | {"": Scale(1.0)}
+    if own not in scales:
+        raise ValueError(f"must have one of the units {', '.join(scales_of(unit))}")
+    scale = scales[own]
+    try:
+        value, u = float(number), 0.0  # a number alone is exact, while the library takes its last digit for uncertain
+    except ValueError:
+        try:
+            measured = ufloat_fromstr(number)
+        except (ValueError, NegativeStdDev):
+            raise ValueError(
+                "must be a number, with its standard uncertainty as 0.2007+/-0.0001 or 0.2007(1)"
+            ) from None
+        value, u = measured.nominal_value, measured.std_dev
+    # Rounded to the digits of a float, so that 217.6 g is the number 0.2176 and not 0.21760000000000002.
+    return Estimate(float(f"{value * scale.factor + scale.zero:.15g}"), float(f"{u * scale.factor:.15g}"), unit)
+
+
+class UnitReading(NamedTuple):
+    """A unit in which a bare number may have been read off, and how many times larger the value then is."""
+
+    unit: str
+    ratio: float
+
+
+def readings(value: float, unit: str, usual: tuple[float, float]) -> list[UnitReading]:
+    """Return the units in which the bare number would be a usual value, those of a bench first.
+
+    >>> readings(10.2, "m", (0.0, 1.0))[0].unit, readings(1005.0, "Pa", (5e4, 1.1e5))[0].unit
+    ('cm', 'hPa')
+    >>> readings(294.15, "degC", (-30.0, 50.0))[0].unit
+    'K'
+    """
+    within = [
+        UnitReading(name, (scale.factor * value + scale.zero) / value)
+        for name, scale in scales_of(unit).items()
+        if value and usual[0] <= scale.factor * value + scale.zero <= usual[1]
+    ]
+    return sorted(within, key=lambda each: each.unit not in ("g", "cm", "hPa", "K"))
