@@ -39,7 +39,6 @@ WHAT = {
     "springmass.layout": "where the parts are",
     "pipeline": "arithmetic, no files",
     "pipeline.analyse": "calls the stages in order",
-    "pipeline.closed": "at rest, creeping, two modes",
     "pipeline.analysis": "the result of an analysis",
     "pipeline.findings": "codes and their words",
     "pipeline.options": "fast, standard, best",
