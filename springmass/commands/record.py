@@ -119,7 +119,7 @@ def record(
     if out.suffix.lower() != ".h5":
         raise ProgramError(f"{out}: a recording becomes a run file, whose name ends in .h5")
     for use, off, names in (
-        ("with --simulate", options.simulate, ("--port",)),
+        ("with --simulate", options.simulate, ("--port", "--framing", "--wait", "--send")),
         ("without --simulate", not options.simulate, ("--seed",)),
         ("without --still", options.still is None, ("--ruler",)),
         ("without --trigger", options.trigger is None, ("--pre",)),

@@ -146,6 +146,10 @@ SHOWN: dict[str, Shown] = {
             for name, value in (("--page-port", "1"), ("--no-browser", ""), ("--want-us", "5"), ("--lan", ""))
         },
         "--law": ("linear", ANY_RECORD, "--law: no effect without --page"),
+        **{
+            name: (value, ANY_RECORD, f"{name}: no effect with --simulate")
+            for name, value in (("--framing", "7E1"), ("--wait", "5"), ("--send", "go"))
+        },
     },
     "page": {
         "": ("page short.txt",),
@@ -161,6 +165,7 @@ SHOWN: dict[str, Shown] = {
         "--output": ("again.h5",),
         "--overwrite": ("", "recover base.wire -o edited.h5"),
         "--speed-of-sound": ("350",),
+        "--option": ("nope=1", "recover base.wire", "got nope"),
     },
     "replay": {
         "": ("replay short.txt --speed=max",),
