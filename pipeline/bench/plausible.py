@@ -32,6 +32,7 @@ DECIDING = 20.0  # ratio of two readings above which a slip would decide the res
 class Slip(NamedTuple):
     """A value that is perhaps a slip: in words, which end in both readings of its number if there are two."""
 
+    attribute: str  # of the scene
     clause: str  # without a full stop, but with a question mark
     asks: bool
     decides: bool  # whether the readings differ so much that no result from this value can be sound
@@ -55,10 +56,11 @@ def slips(scene: Scene) -> tuple[Slip, ...]:
             asked = f": {value:g} {quantity.unit} or {value:g} {others[0].unit}?" if others else ""
             decides = not others or not 1.0 / DECIDING < others[0].ratio < DECIDING
             beyond = f"is beyond {usual[0]:g} to {usual[1]:g} {quantity.unit}"
-            found.append(Slip(f"{name} {effect or beyond}{asked}", bool(asked), decides))
+            clause = f"{name} {effect or beyond}{asked}"
+            found.append(Slip(quantity.attribute, clause, bool(asked), decides))
         if quantity.least > 0.0 and estimate.u >= value:
             wide = f"{name} has an uncertainty as large as the value, u = {estimate.u:g}"
-            found.append(Slip(wide, asks=False, decides=True))
+            found.append(Slip(quantity.attribute, wide, asks=False, decides=True))
     return tuple(found)
 
 

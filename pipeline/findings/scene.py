@@ -14,6 +14,7 @@ from pipeline.results.effects import Effect
 # Drag coefficients of bodies in a stream lie within 0.3 (sphere) and, for an oscillating disc at KC of 0.1, near 10
 # (J. M. R. Graham, J. Fluid Mech. 97 (1980) 331); all damping counts as drag here, which adds a factor of five.
 USUAL_DRAG = (0.3, 50.0)
+DISC = "disc_diameter_m"
 
 
 def scene_findings(scene: Scene, effects: tuple[Effect, ...], estimates: Mapping[str, Estimate]) -> Iterator[Notice]:
@@ -33,7 +34,10 @@ def scene_findings(scene: Scene, effects: tuple[Effect, ...], estimates: Mapping
         "[disc] diameter_m": scene.disc_diameter_m,
     }
     exact = [name for name, estimate in used.items() if estimate is not None and estimate.u == 0]
-    perhaps = [*slips(scene), *_drag(scene, estimates)]
+    perhaps = slips(scene)
+    # A drag coefficient that no disc has says nothing new if the diameter is in doubt already.
+    if all(each.attribute != DISC for each in perhaps):
+        perhaps += tuple(_drag(estimates))
     if perhaps:
         said = [each.clause if each.asks else f"{each.clause}." for each in perhaps]
         numbers = {"first": said[0], "more": len(said) - 1 or None, "all": " ".join(said)}
@@ -44,10 +48,9 @@ def scene_findings(scene: Scene, effects: tuple[Effect, ...], estimates: Mapping
         yield Notice("uncertainty_missing", {"inputs": ", ".join(exact)})
 
 
-def _drag(scene: Scene, estimates: Mapping[str, Estimate]) -> Iterator[Slip]:
-    """Yield a drag coefficient that no disc has, unless the diameter is in doubt already."""
-    drag, named = estimates.get("drag_coefficient"), any("[disc]" in each.clause for each in slips(scene))
-    low, high = USUAL_DRAG
-    if drag is not None and not named and not low - 2.0 * drag.u <= drag.value <= high + 2.0 * drag.u:
+def _drag(estimates: Mapping[str, Estimate]) -> Iterator[Slip]:
+    """Yield a drag coefficient that no disc has."""
+    drag, (low, high) = estimates.get("drag_coefficient"), USUAL_DRAG
+    if drag is not None and not low - 2.0 * drag.u <= drag.value <= high + 2.0 * drag.u:
         clause = f"the drag coefficient would be {drag.value:.2g}, which no disc has: is [disc] diameter_m right?"
-        yield Slip(clause, asks=True, decides=False)
+        yield Slip(DISC, clause, asks=True, decides=False)
