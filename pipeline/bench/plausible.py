@@ -22,7 +22,7 @@ USUAL: dict[str, tuple[float, float]] = {
     "start_displacement_m": (-2.0, 2.0),
     "start_velocity_m_per_s": (-10.0, 10.0),
 }
-"""Values of a bench: from the lowest to the highest pressure at which people live; distances and speeds of a hall."""
+"""Ranges of a bench: the air pressures at which people live, and the distances and speeds of a hall."""
 AIR_SHARE = 0.5  # of the bob's mass that may swing along as air; a disc of 30 cm on 0.1 kg has 11 %
 SPRING_BOBS = 5.0  # bobs that a spring may weigh
 LONGEST_SAG_M = 10.0  # the longest range of a rangefinder (MaxBotix XL-MaxSonar)

@@ -16,7 +16,6 @@ from pipeline.numerics.levels import FALSE_ALARM, NEGLIGIBLE, SIGNIFICANT, cover
 from pipeline.several.compare import SpringRun, shared_covariance, spring_line
 from pipeline.track import F8
 
-FLAT = 0.1  # slope below which a tightly coiled spring is closed, of the slope of the open one
 GRAVITY = Estimate(9.81, 0.015, "m/s^2")  # 9.780 at the equator to 9.832 at the poles, uniformly distributed
 
 
@@ -161,6 +160,6 @@ def _straight(load: F8, position_m: F8) -> tuple[NDArray[np.bool_], str]:
     below, above = load <= corner, load >= corner
     _, slope, u_slope = _line(load[below], position_m[below])
     _, steeper, _ = _line(load[above], position_m[above])
-    if abs(slope) < max(SIGNIFICANT * u_slope, FLAT * abs(steeper)):
+    if abs(slope) < max(SIGNIFICANT * u_slope, NEGLIGIBLE * abs(steeper)):
         return above, "the spring is not stretched by the smaller loads: it has an initial tension"
     return below, "beyond these the spring is stretched out of proportion"

@@ -29,7 +29,7 @@ def distance_cm(t: float) -> float:
 
 @contextmanager
 def board(act: Callable[[int, threading.Event], None]) -> Iterator[str]:
-    """Yield the name of a port; ``act`` writes to its other end until it is told to stop."""
+    """Yield the name of a port; ``act`` writes to its other end until the test ends."""
     master, slave = pty.openpty()
     tty.setraw(slave)
     os.set_blocking(master, False)

@@ -36,7 +36,7 @@ class Column:
     aside : bool
         Whether it is an auxiliary column (row numbers, an uncertainty), which is read only if the user names it.
     words : (n,) array of str or None
-        The text of its cells, if rows are told apart by it.
+        The text of its cells, if it says to which recording a row belongs.
     differences : bool
         Whether each value is the difference from the row before, so that the first may be absent.
     """
