@@ -99,7 +99,7 @@ class Choice(_Field[str, str]):
         return str(given)
 
 
-class Flag(_Field[bool | str, bool]):
+class TrueOrFalse(_Field[bool | str, bool]):
     """A statement of a scene that is true or false: its table and key in a scene file."""
 
     def __init__(self, table: str, key: str) -> None:
@@ -126,7 +126,7 @@ class Scene:
 
     bob_mass_kg: Stated = Stated("bob", "mass_kg", "kg", 1e-12, 1e6)
     spring_mass_kg: Stated = Stated("spring", "mass_kg", "kg", 0.0, 1e6)
-    spring_none: Flag = Flag("spring", "none")
+    spring_none: TrueOrFalse = TrueOrFalse("spring", "none")
     spring_constant_n_per_m: Stated = Stated("spring", "constant_n_per_m", "N/m", 1e-12, 1e12)
     spring_cubic_n_per_m3: Stated = Stated("spring", "cubic_n_per_m3", "N/m3", -1e18, 1e18)
     pendulum_length_m: Stated = Stated("pendulum", "length_m", "m", 1e-4, 1e4)
@@ -205,7 +205,7 @@ class Scene:
 
 
 BENCH_KEYS = {each.place: each for each in vars(Scene).values() if isinstance(each, Stated)}
-_CHOICES = {each.place: each for each in vars(Scene).values() if isinstance(each, Choice | Flag)}
+_CHOICES = {each.place: each for each in vars(Scene).values() if isinstance(each, Choice | TrueOrFalse)}
 PLACES = {quantity.attribute: place for place, quantity in BENCH_KEYS.items()}
 """Table and key in a scene file for every quantity, by its attribute."""
 

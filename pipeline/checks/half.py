@@ -12,7 +12,7 @@ from pipeline.track import F8
 
 # Harmonics of the motion that make pulses, with the line at twice its frequency.
 PULSES = 3
-HIGHEST = 8  # order of the harmonics of the motion that are sought
+HIGHEST_MULTIPLE = 8  # order of the harmonics of the motion that are sought
 # How far the mean moves over the amplitude of the line at twice the frequency, and the harmonic of that line over
 # it. A radial acceleration is g (1 + A^2/4 - 3/4 A^2 cos 2 phi), the magnitude of a sine
 # 2/pi + 4/(3 pi) cos 2 phi - 4/(15 pi) cos 4 phi + ...
@@ -32,7 +32,7 @@ def half_frequency(residual: Residual) -> Outcome | None:
     values = residual.values + residual.fitted.modes.independent(residual.samples.track.t[residual.rows])
     found: dict[str, float | None] = {}
     if _locked(residual, values, 1):
-        sizes = [abs(_locked(residual, values, order)) for order in range(3, HIGHEST + 1)]
+        sizes = [abs(_locked(residual, values, order)) for order in range(3, HIGHEST_MULTIPLE + 1)]
         pulses = 1 + np.count_nonzero(sizes)
         if abs(abs(moves) - RADIAL) < NEGLIGIBLE * RADIAL + SIGNIFICANT * u_moves < RADIAL:
             found["radial"] = moves

@@ -41,7 +41,7 @@ class DecayingModes:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Lines:
+class DecayingLines:
     """Decaying oscillations fitted together, over the scatter of the record and from its first time."""
 
     values: F8  # as of :class:`DecayingModes`
@@ -73,7 +73,9 @@ class Lines:
         return ", ".join(f"{amount(float(means[i]), unit)} at {hz[i]:.4g} Hz" for i in order)
 
 
-def find_lines(samples: Samples, most: int, least: float = 0.0, apart: float = 1.0, fewest: int = 1) -> Lines | None:
+def find_lines(
+    samples: Samples, most: int, least: float = 0.0, apart: float = 1.0, fewest: int = 1
+) -> DecayingLines | None:
     """Fit the strongest lines of a record together; None if they are too few, or cannot be fitted.
 
     Each line starts from the highest peak of what those before it leave. The search ends with ``most`` lines, or before
@@ -106,7 +108,7 @@ def find_lines(samples: Samples, most: int, least: float = 0.0, apart: float = 1
         return None
     dof, correlation = max(y.size - start.size, 1), correlation_length(found.residual)
     widened = found.covariance * (float(found.residual @ found.residual) / dof * correlation)
-    return Lines(
+    return DecayingLines(
         values=found.values,
         covariance=widened,
         residual=found.residual,
