@@ -73,6 +73,10 @@ class Damping:
         return next(fits, None)
 
 
+NO_LAWS = Damping(math.nan, {}, "", (), Scatter(np.empty(0), 0.0, np.empty(0, np.bool_), 1.0))
+"""The damping of a motion that is no oscillation."""
+
+
 def fit_laws(
     windows: Windows,
     t0: float,
