@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pipeline.damping.law_fit import NEGATIVE, Choice, LawFit, choose, fit_law, least_chi2, weigh, without_beaten
+from pipeline.damping.law_fit import NEGATIVE, LawChoice, LawFit, choose, fit_law, least_chi2, weigh, without_beaten
 from pipeline.damping.laws import LAWS, Drag, Law, find_law, free_power
 from pipeline.errors import AnalysisError
 from pipeline.numerics.least_squares import Fit
@@ -126,10 +126,10 @@ def fit_laws(
     return found if enough else _fit_laws(points, t0, tuple(LAWS), known, unit)
 
 
-def select_law(fits: Mapping[str, LawFit], known: str, last_s: float) -> Choice:
+def select_law(fits: Mapping[str, LawFit], known: str, last_s: float) -> LawChoice:
     """Choose among the laws for a record of ``last_s`` seconds; a stated one stands alone."""
     if known in fits:
-        return Choice(known, () if fits[known].rejected else (known,))
+        return LawChoice(known, () if fits[known].rejected else (known,))
     ends = np.array([0.0, last_s])
     return choose(fits, STRONG, lambda name: fits[name].amplitude(ends))
 
