@@ -117,8 +117,8 @@ def damping_findings(damping: Damping) -> Iterator[Notice]:
         unfitted = len(damping.unfitted)
         numbers = {"rejected": len(rejected) + unfitted, "tried": len(damping.fits) + unfitted}
         yield Notice("law_rejected", {**numbers, **_reasons(damping)})
-    if len(damping.admissible) > 1:
-        laws = [damping.fits[name].law for name in damping.admissible]
+    if len(damping.possible) > 1:
+        laws = [damping.fits[name].law for name in damping.possible]
         undamped = next((words_of(law) for law in laws if len(law.parameters) == 1), None)
         names = ", ".join(words_of(law) for law in laws)
         yield Notice("laws_not_separable", {"laws": len(laws), "names": names, "undamped": undamped})

@@ -177,7 +177,7 @@ def _selected(damping: Damping, fits: Mapping[str, _OfLaw]) -> Damping:
     if damping.stated in found:
         selected, admissible = damping.stated, (damping.stated,)
     unfitted = {name: why for name, why in damping.unfitted.items() if name not in found}
-    return replace(damping, fits=found, selected=selected, admissible=admissible, unfitted=unfitted)
+    return replace(damping, fits=found, selected=selected, admissible=admissible, idle=(), unfitted=unfitted)
 
 
 def _phase(phase: Phase, windows: Windows, best: _OfLaw) -> Phase:

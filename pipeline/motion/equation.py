@@ -379,19 +379,18 @@ def _chosen(
     laws = {name: by_name[name].law for name in fits}
     least, points = least_chi2(minima, laws), int(np.count_nonzero(rows.used)) - len(STATE) + 1
     weighed = {n: weigh(laws[n], minima[n], least[n], points, correlation, unit) for n in fits}
-    selected, admissible = select_law(weighed, damping.stated, float(np.max(rows.t)))
+    choice = select_law(weighed, damping.stated, float(np.max(rows.t)))
     scatter = replace(damping.scatter, correlation=correlation)
     every = Damping(
+        **choice._asdict(),
         t0=damping.t0,
         fits=weighed,
-        selected=selected,
-        admissible=admissible,
         scatter=scatter,
         unfitted=unfitted,
         stated=damping.stated,
     )
-    own = fits[selected]
-    return every, by_name[selected], replace(own, covariance=own.covariance * correlation)
+    own = fits[choice.selected]
+    return every, by_name[choice.selected], replace(own, covariance=own.covariance * correlation)
 
 
 def _by_envelope(model: Solved, own: Fit) -> Fit:

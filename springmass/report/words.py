@@ -74,7 +74,7 @@ def damping_sentence(analysis: Analysis) -> str:
             f"No damping law fits to within the scatter; {chosen} is {nearest}. Quote the amplitude against time "
             "(amplitude.csv), not a damping rate."
         )
-    possible = [words_of(damping.fits[name].law) for name in damping.admissible if name != damping.selected]
+    possible = [words_of(damping.fits[name].law) for name in damping.possible if name != damping.selected]
     if damping.growth_rate:
         text = "The amplitude grows exponentially"
     elif len(damping.best.law.parameters) == 1:

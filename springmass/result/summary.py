@@ -81,7 +81,7 @@ def _head(analysis: Analysis, name: str) -> str:
 
 
 def _law(damping: Damping) -> str:
-    others = [name for name in damping.admissible if name != damping.selected]
+    others = [name for name in damping.possible if name != damping.selected]
     if damping.by_statement:
         return f"{damping.selected} ({law_status(damping, damping.selected)})"
     state = "rejected, yet the least bad" if damping.best.rejected else "selected"
