@@ -18,8 +18,8 @@ from pipeline.checks.rounding import rounding
 from pipeline.checks.sensor import held, held_count, held_numbers, smoothed
 from pipeline.checks.shape import folded_shape
 from pipeline.motion.at_rest import Rest
-from pipeline.motion.fitted import Fitted
-from pipeline.motion.kinds import FittedMotion
+from pipeline.motion.fitted import Oscillation
+from pipeline.motion.kinds import Motion
 from pipeline.notice import Notice
 from pipeline.parts.lost_rows import LostRows
 from pipeline.samples.condition import Samples
@@ -38,7 +38,7 @@ TESTS: tuple[Callable[[Residual], Outcome | None], ...] = (
 
 
 def judge(
-    samples: Samples, motion: FittedMotion, scene: Scene, lost: LostRows | None = None
+    samples: Samples, motion: Motion, scene: Scene, lost: LostRows | None = None
 ) -> tuple[tuple[Notice, ...], tuple[Misfit, ...]]:
     """Return what the limits and the tests found, and what it adds to the uncertainties.
 
@@ -46,7 +46,7 @@ def judge(
     distorts every period, which would look like a shape. A relaxation and two modes are accepted by such a test of
     their fit. Of a bob at rest only a sensor that holds its readings shows.
     """
-    if not isinstance(motion, Fitted):
+    if not isinstance(motion, Oscillation):
         repeats = held_count(samples) if isinstance(motion, Rest) else 1
         numbers_of_held = held_numbers(repeats, 1.0 / samples.track.rate_hz)
         return ((Notice("held_samples", numbers_of_held),) if repeats > 1 else ()), ()
