@@ -10,18 +10,18 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from pipeline.analysis import Analysis, Motion, Oscillation
+from pipeline.analysis import Analysis
 from pipeline.bench.scene import Scene
-from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.checks.echoes import echoes_by_chance, find_clusters
 from pipeline.checks.judge import judge
 from pipeline.findings.finding import worded
-from pipeline.findings.motion import damping_findings, fit_findings, kind_findings, motion_findings
+from pipeline.findings.motion import damping_findings, fit_findings, kind_findings, motion_findings, steady_findings
 from pipeline.findings.samples import clock_findings, part_findings, sample_findings
 from pipeline.findings.scene import scene_findings
 from pipeline.motion.at_rest import Rest
-from pipeline.motion.fitted import Fitted
-from pipeline.motion.kinds import fit_motion
+from pipeline.motion.fitted import Oscillation
+from pipeline.motion.kinds import Motion, fit_motion
+from pipeline.motion.lines import Steady, find_steady
 from pipeline.motion.relaxation import Relaxation
 from pipeline.motion.two_modes import TwoModes
 from pipeline.notice import Notice
@@ -32,7 +32,6 @@ from pipeline.results.derive import derive
 from pipeline.results.effects import tabulate
 from pipeline.samples.condition import Samples, condition
 from pipeline.track import Track
-from pipeline.windows.cycles import Cycles
 
 __all__ = ["Analysis", "Oscillation", "Relaxation", "Rest", "TwoModes", "analyse"]
 
@@ -58,22 +57,24 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
         track = replace(track, clock_rate=(1e-6 * ppm.value, 1e-6 * ppm.u))
     if track.unit == "m" and track.sigma_m is None and scene.sensor_sigma_m is not None:
         track = replace(track, sigma_m=scene.sensor_sigma_m.value)
-    part = find_part(condition(track))
-    fitted, samples = fit_motion(part, options), part.samples
+    samples = condition(track)
+    if (steady := find_steady(samples)) is not None:
+        samples = condition(samples.less(steady.wave).track)
+    part = find_part(samples)
+    motion, samples = fit_motion(part, options), part.samples
+    if steady is not None:
+        samples, motion = _with_steady(samples, motion, steady)
     track = samples.track
-    notices, misfits = judge(samples, fitted, SensorFilter.of(scene, track.rate_hz), part.lost)
-    effects = tabulate(track, fitted, scene) if isinstance(fitted, Fitted) else ()
-    derived = derive(track, fitted, scene, effects, misfits)
+    notices, misfits = judge(samples, motion, scene, part.lost)
+    effects = tabulate(track, motion, scene) if isinstance(motion, Oscillation) else ()
+    derived = derive(track, motion, scene, effects, misfits)
     constant = "spring_constant" in derived.estimates
-    left_out = part_findings(part.beginning(fitted.start_s), float(track.t[0]), float(track.t[-1]))
-    motion: Motion
+    left_out = part_findings(part.beginning(motion.start_s), float(track.t[0]), float(track.t[-1]))
     shown: tuple[Iterable[Notice], ...]
-    if isinstance(fitted, Fitted):
-        assert isinstance(part.cycles, Cycles)
-        motion = Oscillation.of(fitted, part.cycles, derived)
-        shown = _shown(samples, motion, notices)
+    if isinstance(motion, Oscillation):
+        shown = _shown(samples, motion, derived.estimates["offset"].value, notices)
     else:
-        motion = fitted if isinstance(fitted, Rest) else replace(fitted, why=fitted.described(derived.estimates))
+        motion = motion if isinstance(motion, Rest) else replace(motion, why=motion.described(derived.estimates))
         kind = kind_findings(motion, derived.estimates)
         shown = (kind, notices, sample_findings(samples, motion.flags, samples.noise))
     # A missing or wrong mass changes the spring constant more than anything that the recording shows.
@@ -85,16 +86,25 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
         samples=samples,
         motion=motion,
         effects=effects,
-        findings=worded(track.unit, bench, left_out, *shown, clock_findings(track)),
+        findings=worded(track.unit, bench, steady_findings(steady), left_out, *shown, clock_findings(track)),
         derived=derived,
     )
 
 
-def _shown(samples: Samples, motion: Oscillation, notices: tuple[Notice, ...]) -> tuple[Iterable[Notice], ...]:
+def _with_steady(samples: Samples, motion: Motion, steady: Steady) -> tuple[Samples, Motion]:
+    """Return samples and motion with the steady oscillation that was subtracted before the fit."""
+    if isinstance(motion, Oscillation):
+        waveform = replace(motion.waveform, position=motion.waveform.position + steady.wave)
+        motion = replace(motion, waveform=waveform)
+    return samples.less(-steady.wave), motion
+
+
+def _shown(
+    samples: Samples, motion: Oscillation, offset: float, notices: tuple[Notice, ...]
+) -> tuple[Iterable[Notice], ...]:
     """Return the findings on an oscillation and its samples in groups."""
     windows, track = motion.windows, samples.track
-    swing = motion.derived.estimates["offset"].value, float(motion.damping.best.joint.values[0])
+    swing = offset, float(motion.damping.best.joint.values[0])
     clusters, by_chance = find_clusters(track, windows, motion.phase), echoes_by_chance(samples.flags, windows)
     of_samples = sample_findings(samples, windows.flags, windows.noise, clusters, swing, by_chance=by_chance)
-    motions = motion_findings(motion.cycles, motion)
-    return motions, damping_findings(motion.damping), notices, of_samples, fit_findings(motion)
+    return motion_findings(motion), damping_findings(motion.damping), notices, of_samples, fit_findings(motion)

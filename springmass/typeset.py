@@ -152,7 +152,7 @@ def law_status(damping: Damping, name: str) -> str:
         return f"{rejection_of(fit)}, yet the least bad" if fit.rejected else "selected"
     if fit.rejected:
         return rejection_of(fit)
-    return "admissible" if name in damping.admissible else "unlikely"
+    return "admissible" if name in damping.possible else "unlikely"
 
 
 def cells(estimate: Estimate | None) -> str:

@@ -13,19 +13,19 @@ from pipeline.damping.laws import words_of
 from pipeline.damping.select import Damping
 from pipeline.motion.at_rest import Rest
 from pipeline.motion.by_samples import FEW_WINDOWS
-from pipeline.motion.fitted import Fitted, RestPosition
-from pipeline.motion.kinds import FittedMotion
+from pipeline.motion.fitted import Oscillation, RestPosition
+from pipeline.motion.kinds import Motion
+from pipeline.motion.lines import Steady
 from pipeline.motion.relaxation import Relaxation
 from pipeline.motion.two_modes import TwoModes
 from pipeline.notice import Notice
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.levels import NOTICEABLE, VERY_STRONG
 from pipeline.units import amount, number
-from pipeline.windows.cycles import Cycles
 from pipeline.windows.demodulate import model_error
 
 
-def kind_findings(motion: FittedMotion, estimates: Mapping[str, Estimate]) -> Iterator[Notice]:
+def kind_findings(motion: Motion, estimates: Mapping[str, Estimate]) -> Iterator[Notice]:
     """Yield what kind of motion a recording shows, if it is not an oscillation of many cycles."""
     if isinstance(motion, Relaxation) and motion.kind == "strong":
         yield Notice("strongly_damped", {"damping_ratio": motion.damping_ratio.value, "why": motion.why})
@@ -39,7 +39,14 @@ def kind_findings(motion: FittedMotion, estimates: Mapping[str, Estimate]) -> It
         yield Notice("no_oscillation", {"why": motion.why})
 
 
-def fit_findings(fitted: Fitted) -> Iterator[Notice]:
+def steady_findings(steady: Steady | None) -> Iterator[Notice]:
+    """Yield the steady oscillation that was subtracted before the fit."""
+    if steady is not None:
+        cause = "mains hum" if steady.mains else "a drive"
+        yield Notice("driven", {"amplitude_m": steady.amplitude, "frequency_hz": steady.frequency_hz, "cause": cause})
+
+
+def fit_findings(fitted: Oscillation) -> Iterator[Notice]:
     """Yield what the fits of the samples came to."""
     if fitted.method == "equation":
         yield Notice("strongly_damped", {"why": fitted.why})
@@ -49,12 +56,12 @@ def fit_findings(fitted: Fitted) -> Iterator[Notice]:
         yield Notice("not_converged", {"why": fitted.misfit})
 
 
-def motion_findings(cycles: Cycles, fitted: Fitted) -> Iterator[Notice]:
+def motion_findings(fitted: Oscillation) -> Iterator[Notice]:
     """Yield what the fit of an oscillation shows of its motion."""
     windows, phase, rest = fitted.windows, fitted.phase, fitted.rest
     count, omega = windows.t.size, phase.angular_frequency.value
     if count < FEW_WINDOWS:
-        yield Notice("short_record", {"periods": cycles.count, "windows": count})
+        yield Notice("short_record", {"periods": windows.cycles.count, "windows": count})
     if windows.lost:
         lost = {"periods": windows.lost, "all_periods": windows.lost + count}
         yield Notice("missing_samples", lost, "warning")
@@ -82,7 +89,7 @@ def _rest_drift(rest: RestPosition, u_rate: float) -> Notice:
     return Notice("rest_drift", numbers)
 
 
-def _modes(fitted: Fitted, unit: str) -> Iterator[Notice]:
+def _modes(fitted: Oscillation, unit: str) -> Iterator[Notice]:
     modes, main = fitted.modes, fitted.phase.angular_frequency.value / (2.0 * math.pi)
     own = [mode for mode in modes.members if mode.kind == "mode"]
     if not own:
@@ -118,8 +125,8 @@ def damping_findings(damping: Damping) -> Iterator[Notice]:
         unfitted = len(damping.unfitted)
         numbers = {"rejected": len(rejected) + unfitted, "tried": len(damping.fits) + unfitted}
         yield Notice("law_rejected", {**numbers, **_reasons(damping)})
-    if len(damping.admissible) > 1:
-        laws = [damping.fits[name].law for name in damping.admissible]
+    if len(damping.possible) > 1:
+        laws = [damping.fits[name].law for name in damping.possible]
         undamped = next((words_of(law) for law in laws if len(law.parameters) == 1), None)
         names = ", ".join(words_of(law) for law in laws)
         yield Notice("laws_not_separable", {"laws": len(laws), "names": names, "undamped": undamped})

@@ -60,7 +60,7 @@ def test_the_same_numbers_give_the_same_results_in_their_own_unit(quantity: str,
         "1": "1/s",
     }
     assert units == {"A0": unit, "gamma": "1/s", "beta": per[unit]}
-    assert motion_of(other).derived.coefficients["beta"].unit == per[unit]
+    assert other.derived.coefficients["beta"].unit == per[unit]
 
 
 @every
@@ -69,7 +69,7 @@ def test_no_number_is_in_metres_where_nothing_was_measured_in_them(quantity: str
     found = analyse(track(quantity, unit), SCENE)
     motion = motion_of(found)
     units = {name: each.unit for name, each in found.estimates.items()}
-    units |= {f"budget {name}": each.estimate.unit for name, each in motion.derived.budgets.items()}
+    units |= {f"budget {name}": each.estimate.unit for name, each in found.derived.budgets.items()}
     units |= {f"effect {each.name}": each.unit for each in found.effects}
     for name, fit in motion.damping.fits.items():
         units |= {f"{name} {x}": own for x, own in zip(fit.joint.names, fit.joint.units, strict=True)}
@@ -138,5 +138,5 @@ def test_what_needs_a_length_says_so_in_one_line() -> None:
         classic(track("voltage", "V"))
     found = analyse(track("angle", "rad"), SCENE)
     with pytest.raises(AnalysisError, match=r"^swing: "):
-        SpringRun.of("swing", motion_of(found).derived)
-    assert SpringRun.of("coil", motion_of(analyse(track("voltage", "V"), SCENE)).derived).clock == ""
+        SpringRun.of("swing", found.derived)
+    assert SpringRun.of("coil", analyse(track("voltage", "V"), SCENE).derived).clock == ""
