@@ -12,16 +12,16 @@ from dataclasses import replace
 
 from pipeline.analysis import Analysis
 from pipeline.bench.scene import Scene
-from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.checks.echoes import echoes_by_chance, find_clusters
 from pipeline.checks.judge import judge
 from pipeline.findings.finding import worded
-from pipeline.findings.motion import damping_findings, fit_findings, kind_findings, motion_findings
+from pipeline.findings.motion import damping_findings, fit_findings, kind_findings, motion_findings, steady_findings
 from pipeline.findings.samples import clock_findings, part_findings, sample_findings
 from pipeline.findings.scene import scene_findings
 from pipeline.motion.at_rest import Rest
 from pipeline.motion.fitted import Oscillation
-from pipeline.motion.kinds import fit_motion
+from pipeline.motion.kinds import Motion, fit_motion
+from pipeline.motion.lines import Steady, find_steady
 from pipeline.motion.relaxation import Relaxation
 from pipeline.motion.two_modes import TwoModes
 from pipeline.notice import Notice
@@ -57,10 +57,15 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
         track = replace(track, clock_rate=(1e-6 * ppm.value, 1e-6 * ppm.u))
     if track.unit == "m" and track.sigma_m is None and scene.sensor_sigma_m is not None:
         track = replace(track, sigma_m=scene.sensor_sigma_m.value)
-    part = find_part(condition(track))
+    samples = condition(track)
+    if (steady := find_steady(samples)) is not None:
+        samples = condition(samples.less(steady.wave).track)
+    part = find_part(samples)
     motion, samples = fit_motion(part, options), part.samples
+    if steady is not None:
+        samples, motion = _with_steady(samples, motion, steady)
     track = samples.track
-    notices, misfits = judge(samples, motion, SensorFilter.of(scene, track.rate_hz), part.lost)
+    notices, misfits = judge(samples, motion, scene, part.lost)
     effects = tabulate(track, motion, scene) if isinstance(motion, Oscillation) else ()
     derived = derive(track, motion, scene, effects, misfits)
     constant = "spring_constant" in derived.estimates
@@ -81,9 +86,17 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
         samples=samples,
         motion=motion,
         effects=effects,
-        findings=worded(track.unit, bench, left_out, *shown, clock_findings(track)),
+        findings=worded(track.unit, bench, steady_findings(steady), left_out, *shown, clock_findings(track)),
         derived=derived,
     )
+
+
+def _with_steady(samples: Samples, motion: Motion, steady: Steady) -> tuple[Samples, Motion]:
+    """Return samples and motion with the steady oscillation that was subtracted before the fit."""
+    if isinstance(motion, Oscillation):
+        waveform = replace(motion.waveform, position=motion.waveform.position + steady.wave)
+        motion = replace(motion, waveform=waveform)
+    return samples.less(-steady.wave), motion
 
 
 def _shown(

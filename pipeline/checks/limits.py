@@ -49,8 +49,8 @@ LIMITS = (
 )
 
 
-def beyond_limits(samples: Samples, fitted: Oscillation) -> Iterator[Outcome]:
-    """Yield every limit that the motion exceeds.
+def beyond_limits(samples: Samples, fitted: Oscillation, *, spring: bool) -> Iterator[Outcome]:
+    """Yield every limit that the motion exceeds; without a spring only that of its samples per period.
 
     The spring can only pull, so the bob never accelerates downward faster than in free fall: :math:`A\\omega^2 \\le g`,
     and not much more if the spring goes slack. For a recorded acceleration :math:`A\\omega^2` is the amplitude itself.
@@ -60,7 +60,7 @@ def beyond_limits(samples: Samples, fitted: Oscillation) -> Iterator[Outcome]:
     """
     numbers = _numbers(samples, fitted)
     reported = set()
-    for limit in LIMITS:
+    for limit in LIMITS if spring else LIMITS[:1]:
         if limit.code in reported or not (numbers[limit.number] < limit.least or numbers[limit.number] > limit.most):
             continue
         reported.add(limit.code)

@@ -15,6 +15,7 @@ from pipeline.motion.at_rest import Rest
 from pipeline.motion.by_samples import FEW_WINDOWS
 from pipeline.motion.fitted import Oscillation, RestPosition
 from pipeline.motion.kinds import Motion
+from pipeline.motion.lines import Steady
 from pipeline.motion.relaxation import Relaxation
 from pipeline.motion.two_modes import TwoModes
 from pipeline.notice import Notice
@@ -36,6 +37,13 @@ def kind_findings(motion: Motion, estimates: Mapping[str, Estimate]) -> Iterator
         yield Notice("two_modes", {**both, "why": motion.why})
     elif isinstance(motion, Rest):
         yield Notice("no_oscillation", {"why": motion.why})
+
+
+def steady_findings(steady: Steady | None) -> Iterator[Notice]:
+    """Yield the steady oscillation that was subtracted before the fit."""
+    if steady is not None:
+        cause = "mains hum" if steady.mains else "a drive"
+        yield Notice("driven", {"amplitude_m": steady.amplitude, "frequency_hz": steady.frequency_hz, "cause": cause})
 
 
 def fit_findings(fitted: Oscillation) -> Iterator[Notice]:

@@ -12,8 +12,9 @@ from pipeline.motion.averaged import check_coherence, fit_windows, typical_miss
 from pipeline.motion.by_samples import FEW_WINDOWS, fit_samples
 from pipeline.motion.equation import fit_equation
 from pipeline.motion.fitted import Oscillation
+from pipeline.motion.lines import WEAKER
 from pipeline.motion.relaxation import LEAST_DAMPING, Relaxation, find_relaxation
-from pipeline.motion.two_modes import WEAKER, TwoModes, find_two_modes
+from pipeline.motion.two_modes import TwoModes, find_two_modes
 from pipeline.options import Options
 from pipeline.parts.part import Part, check_sinusoid, start_of
 from pipeline.samples.condition import COARSE, Samples

@@ -276,7 +276,7 @@ def _of_scene(track: Track, scene: Scene, included: set[str], inputs: Inputs) ->
         "unstated_spring_mass": stated("unstated_spring_mass", unstated),
         "of_added_mass": "added_mass" in included or None,
         # An angle may be that of a pendulum, so a spring constant is given only if the scene has a spring.
-        "of_spring": not track.unit.startswith("rad") or spring is not None or None,
+        "of_spring": (scene.hangs_on_spring and not track.unit.startswith("rad")) or spring is not None or None,
     }
 
 

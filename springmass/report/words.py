@@ -129,6 +129,7 @@ def summary(analysis: Analysis) -> tuple[tuple[str, str], ...]:
     if (
         "spring_constant" not in analysis.estimates
         and analysis.scene.bob_mass_kg is None
+        and analysis.scene.hangs_on_spring
         and analysis.track.unit == "m"
     ):
         to_do += " For the spring constant, state the mass: --mass-kg KG."

@@ -139,7 +139,7 @@ def _needs_mass(run: Analysis) -> bool:
     column = table_estimates(run)
     amplitude = column.get(TableKey("amplitude"))
     of_length = TableKey("period") in column and amplitude is not None and amplitude.unit == "m"
-    return of_length and run.scene.bob_mass_kg is None
+    return of_length and run.scene.bob_mass_kg is None and run.scene.hangs_on_spring
 
 
 def numbers_of(analysis: Analysis) -> Mapping[str, Estimate]:
