@@ -15,8 +15,8 @@ WITHOUT = """
 import os, signal, sys
 for module in ("pty", "tty", "grp", "pwd", "resource", *(() if "record" in sys.argv else ("fcntl", "termios"))):
     sys.modules[module] = None  # pyserial reads a port by fcntl and termios here, and by other modules on Windows
-for owner, names in ((signal, "SIGHUP SIGALRM setitimer ITIMER_REAL pthread_sigmask"), (os, "sched_getaffinity fdatasync"
-    " O_NONBLOCK O_NOCTTY O_NOFOLLOW")):
+of_system = "sched_getaffinity fdatasync O_NONBLOCK O_NOCTTY O_NOFOLLOW"
+for owner, names in ((signal, "SIGHUP SIGALRM setitimer ITIMER_REAL pthread_sigmask"), (os, of_system)):
     for name in names.split():
         if hasattr(owner, name):
             delattr(owner, name)
@@ -27,11 +27,9 @@ def run(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     """Run a command whose processes lack them all."""
     (folder / "site").mkdir(exist_ok=True)
     (folder / "site" / "sitecustomize.py").write_text(WITHOUT)
-    environment = {**os.environ, "PYTHONPATH": str(folder / "site")}
+    own = {**os.environ, "PYTHONPATH": str(folder / "site")}
     command = [sys.executable, "-m", "springmass", *words]
-    return subprocess.run(
-        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120, check=False
-    )
+    return subprocess.run(command, cwd=folder, env=own, capture_output=True, text=True, timeout=120, check=False)
 
 
 @pytest.mark.parametrize(
