@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import IO
 
+_HAS_LOCKS = True
 try:
     import fcntl
 except ImportError:  # on Windows
-    fcntl = None  # type: ignore[assignment]
+    _HAS_LOCKS = False
 
 
 def lock(file: IO[bytes] | int, *, wait: bool = False) -> bool:
@@ -15,7 +16,7 @@ def lock(file: IO[bytes] | int, *, wait: bool = False) -> bool:
 
     Raises BlockingIOError if another descriptor holds the lock and this one does not ``wait`` for it.
     """
-    if fcntl is None:
+    if not _HAS_LOCKS:
         return False
     try:
         fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
@@ -28,7 +29,7 @@ def lock(file: IO[bytes] | int, *, wait: bool = False) -> bool:
 
 def is_locked(file: IO[bytes]) -> bool:
     """Return whether another descriptor holds the lock of an open file; False where that is unknown."""
-    if fcntl is None:
+    if not _HAS_LOCKS:
         return False
     try:
         fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
