@@ -47,7 +47,7 @@ def test_two_cycles_in_each_of_the_motion_are_named(kind: str) -> None:
     record = kinds.trouble(kind, 1)
     said = record.said()
     assert not any(value.sound for value in said.values.values())
-    analysis = analyse(Track.from_arrays(record.t, record.y, unit=record.unit, quantity=kinds.QUANTITIES[record.unit]))
+    analysis = analyse(Track.from_arrays(record.t, record.y, unit=record.unit))
     offered = next(finding.values["motion_s"] for finding in analysis.findings if finding.code == "half_frequency")
     period = record.truth["period"]
     low, high = period if isinstance(period, tuple) else (period, period)
