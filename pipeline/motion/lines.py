@@ -81,7 +81,7 @@ class Record:
         grid = np.arange(int(self.tau[-1] / step) + 1) * step
         power: F8 = np.abs(np.fft.rfft(np.interp(grid, self.tau, values), 8 * grid.size)) ** 2
         power[:8] = 0.0  # lines below one period per record count as drift
-        omega: F8 = 2.0 * math.pi * np.arange(power.size) / (8 * grid.size * step)
+        power = np.asarray(np.abs(np.fft.rfft(np.interp(grid, self.tau, values), 8 * grid.size)) ** 2, np.float64)
         return omega, power
 
     def strongest(self, values: F8) -> float:
