@@ -79,10 +79,9 @@ class Record:
         """Return angular frequencies, rad/s, and powers of values (n,); their times need not be equally spaced."""
         step = float(np.median(np.diff(self.tau)))
         grid = np.arange(int(self.tau[-1] / step) + 1) * step
-        power: F8 = np.abs(np.fft.rfft(np.interp(grid, self.tau, values), 8 * grid.size)) ** 2
-        power[:8] = 0.0  # lines below one period per record count as drift
         power = np.asarray(np.abs(np.fft.rfft(np.interp(grid, self.tau, values), 8 * grid.size)) ** 2, np.float64)
-        return omega, power
+        power[:8] = 0.0  # lines below one period per record count as drift
+        return 2.0 * math.pi * np.arange(power.size, dtype=np.float64) / (8 * grid.size * step), power
 
     def strongest(self, values: F8) -> float:
         """Return the angular frequency of the strongest line of values (n,), rad/s."""
