@@ -45,7 +45,7 @@ class DecayingModes:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Record:
+class Scaled:
     """The samples used of a record, over their standard deviation, with times from the first one."""
 
     tau: F8
@@ -56,7 +56,7 @@ class Record:
     start_s: float
 
     @classmethod
-    def of(cls, samples: Samples) -> Record | None:
+    def of(cls, samples: Samples) -> Scaled | None:
         """Return the record; None if it is too short, too long or motionless."""
         used = samples.used & np.isfinite(samples.track.t)
         t, y = samples.track.t[used], samples.track.y[used]
@@ -114,7 +114,7 @@ class Record:
 class DecayingLines:
     """Decaying oscillations fitted together, over the scatter of the record and from its first time."""
 
-    record: Record
+    record: Scaled
     values: F8  # as of :class:`DecayingModes`
     covariance: F8  # (p, p); widened by the residual and its correlation
     residual: F8
@@ -176,7 +176,7 @@ def find_several(samples: Samples) -> DecayingLines | None:
 
     Each one starts from the highest peak of what the others leave, or half a bin beside one that has it within a bin.
     """
-    record = Record.of(samples)
+    record = Scaled.of(samples)
     found = None
     for _ in range(ROUNDS if record is not None and record.tau.size <= MOST // ROUNDS else 0):
         assert record is not None
@@ -214,7 +214,7 @@ def find_apart(samples: Samples) -> Apart | None:
     least a third of it at the start, as after a start from rest. Mains hum may have any size. An overtone is far above
     the strongest line, is no multiple of it, and at least a tenth of it at the start.
     """
-    record = Record.of(samples)
+    record = Scaled.of(samples)
     if record is None:
         return None
     omega, power = record.spectrum(record.values)
@@ -237,7 +237,7 @@ def find_apart(samples: Samples) -> Apart | None:
     return None
 
 
-def _above(record: Record, first: float, omega: F8, power: F8) -> Iterator[float]:
+def _above(record: Scaled, first: float, omega: F8, power: F8) -> Iterator[float]:
     """Yield the highest line far above the first one and beside its multiples, if it is none of the noise."""
     beside = np.abs(omega - first * np.round(omega / first))
     far = (omega > OVERTONE * first) & (beside > APART * math.tau / record.seconds + NOTICEABLE * omega)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.motion.lines import WEAKER, Record
+from pipeline.motion.lines import WEAKER, Scaled
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.levels import NEGLIGIBLE
 from pipeline.samples.condition import Samples
@@ -59,7 +59,7 @@ def find_two_modes(samples: Samples) -> TwoModes | None:
     from the strongest line of the spectrum and the strongest line of the residual of the first. Covariances are scaled
     by the residuals, including their correlation.
     """
-    if (record := Record.of(samples)) is None:
+    if (record := Scaled.of(samples)) is None:
         return None
     first = record.strongest(record.values)
     second = record.strongest(record.less(record.linear((first, 0.0))))
