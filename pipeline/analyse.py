@@ -14,6 +14,7 @@ from pipeline.analysis import Analysis, Motion, Oscillation
 from pipeline.bench.scene import Scene
 from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.checks.echoes import echoes_by_chance, find_clusters
+from pipeline.checks.halves import compare_halves
 from pipeline.checks.judge import judge
 from pipeline.findings.finding import worded
 from pipeline.findings.motion import damping_findings, fit_findings, kind_findings, motion_findings
@@ -59,9 +60,11 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
     if track.unit == "m" and track.sigma_m is None and scene.sensor_sigma_m is not None:
         track = replace(track, sigma_m=scene.sensor_sigma_m.value)
     part = find_part(condition(track))
-    fitted, samples = fit_motion(part, options), part.samples
+    samples = part.samples
+    fitted, apart = compare_halves(fit_motion(part, options))
     track = samples.track
     notices, misfits = judge(samples, fitted, SensorFilter.of(scene, track.rate_hz), part.lost)
+    notices = (*apart, *notices)
     effects = tabulate(track, fitted, scene) if isinstance(fitted, Fitted) else ()
     derived = derive(track, fitted, scene, effects, misfits)
     constant = "spring_constant" in derived.estimates

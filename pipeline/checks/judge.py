@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.checks.limits import beyond_limits
-from pipeline.checks.model import colour, excess, halves, phases, slow_change
+from pipeline.checks.model import colour, excess, phases, slow_change
 from pipeline.checks.residual import Misfit, Outcome, Residual, residual_of
 from pipeline.checks.rounding import rounding
 from pipeline.checks.sensor import held, held_count, held_numbers, smoothed
@@ -28,7 +28,6 @@ TESTS: tuple[Callable[[Residual], Outcome | None], ...] = (
     held,
     smoothed,
     excess,
-    halves,
     colour,
     phases,
 )
