@@ -10,30 +10,39 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from pipeline.analysis import Analysis, Motion, Oscillation
+import numpy as np
+
+from pipeline.analysis import Analysis
 from pipeline.bench.scene import Scene
-from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.checks.echoes import echoes_by_chance, find_clusters
 from pipeline.checks.halves import compare_halves
 from pipeline.checks.judge import judge
 from pipeline.findings.finding import worded
-from pipeline.findings.motion import damping_findings, fit_findings, kind_findings, motion_findings
+from pipeline.findings.motion import (
+    apart_finding,
+    damping_findings,
+    fit_findings,
+    kind_findings,
+    motion_findings,
+    several_findings,
+)
 from pipeline.findings.samples import clock_findings, part_findings, sample_findings
 from pipeline.findings.scene import scene_findings
 from pipeline.motion.at_rest import Rest
-from pipeline.motion.fitted import Fitted
-from pipeline.motion.kinds import fit_motion
+from pipeline.motion.fitted import Oscillation
+from pipeline.motion.kinds import Motion, fit_motion
+from pipeline.motion.lines import Apart, find_apart
 from pipeline.motion.relaxation import Relaxation
 from pipeline.motion.two_modes import TwoModes
 from pipeline.notice import Notice
+from pipeline.numerics.levels import ROUNDS
 from pipeline.numerics.threads import one_thread
 from pipeline.options import Options
 from pipeline.parts.part import find_part
 from pipeline.results.derive import derive
 from pipeline.results.effects import tabulate
 from pipeline.samples.condition import Samples, condition
-from pipeline.track import Track
-from pipeline.windows.cycles import Cycles
+from pipeline.track import F8, Track
 
 __all__ = ["Analysis", "Oscillation", "Relaxation", "Rest", "TwoModes", "analyse"]
 
@@ -59,24 +68,28 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
         track = replace(track, clock_rate=(1e-6 * ppm.value, 1e-6 * ppm.u))
     if track.unit == "m" and track.sigma_m is None and scene.sensor_sigma_m is not None:
         track = replace(track, sigma_m=scene.sensor_sigma_m.value)
-    part = find_part(condition(track))
-    samples = part.samples
-    fitted, apart = compare_halves(fit_motion(part, options))
+    samples = condition(track)
+    apart = list[Apart]()
+    while len(apart) < ROUNDS and (line := find_apart(samples)) is not None:
+        apart.append(line)
+        samples = condition(samples.less(line.wave).track)
+    part = find_part(samples)
+    motion, samples = fit_motion(part, options), part.samples
+    if apart:
+        samples, motion = _with_lines(samples, motion, np.sum([line.wave for line in apart], axis=0))
     track = samples.track
-    notices, misfits = judge(samples, fitted, SensorFilter.of(scene, track.rate_hz), part.lost)
-    notices = (*apart, *notices)
-    effects = tabulate(track, fitted, scene) if isinstance(fitted, Fitted) else ()
-    derived = derive(track, fitted, scene, effects, misfits)
+    motion, differ = compare_halves(motion)
+    notices, misfits = judge(samples, motion, scene, part.lost)
+    notices = (*differ, *notices)
+    effects = tabulate(track, motion, scene) if isinstance(motion, Oscillation) else ()
+    derived = derive(track, motion, scene, effects, misfits)
     constant = "spring_constant" in derived.estimates
-    left_out = part_findings(part.beginning(fitted.start_s), float(track.t[0]), float(track.t[-1]))
-    motion: Motion
+    left_out = part_findings(part.beginning(motion.start_s), float(track.t[0]), float(track.t[-1]))
     shown: tuple[Iterable[Notice], ...]
-    if isinstance(fitted, Fitted):
-        assert isinstance(part.cycles, Cycles)
-        motion = Oscillation.of(fitted, part.cycles, derived)
-        shown = _shown(samples, motion, notices)
+    if isinstance(motion, Oscillation):
+        shown = _shown(samples, motion, derived.estimates["offset"].value, notices)
     else:
-        motion = fitted if isinstance(fitted, Rest) else replace(fitted, why=fitted.described(derived.estimates))
+        motion = motion if isinstance(motion, Rest) else replace(motion, why=motion.described(derived.estimates))
         kind = kind_findings(motion, derived.estimates)
         shown = (kind, notices, sample_findings(samples, motion.flags, samples.noise))
     # A missing or wrong mass changes the spring constant more than anything that the recording shows.
@@ -88,16 +101,26 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
         samples=samples,
         motion=motion,
         effects=effects,
-        findings=worded(track.unit, bench, left_out, *shown, clock_findings(track)),
+        findings=worded(track.unit, bench, map(apart_finding, apart), left_out, *shown, clock_findings(track)),
         derived=derived,
     )
 
 
-def _shown(samples: Samples, motion: Oscillation, notices: tuple[Notice, ...]) -> tuple[Iterable[Notice], ...]:
+def _with_lines(samples: Samples, motion: Motion, wave: F8) -> tuple[Samples, Motion]:
+    """Return samples and motion with the lines that were subtracted before the fit, (n,)."""
+    if isinstance(motion, Oscillation):
+        waveform = replace(motion.waveform, position=motion.waveform.position + wave)
+        motion = replace(motion, waveform=waveform)
+    return samples.less(-wave), motion
+
+
+def _shown(
+    samples: Samples, motion: Oscillation, offset: float, notices: tuple[Notice, ...]
+) -> tuple[Iterable[Notice], ...]:
     """Return the findings on an oscillation and its samples in groups."""
     windows, track = motion.windows, samples.track
-    swing = motion.derived.estimates["offset"].value, float(motion.damping.best.joint.values[0])
+    swing = offset, float(motion.damping.best.joint.values[0])
     clusters, by_chance = find_clusters(track, windows, motion.phase), echoes_by_chance(samples.flags, windows)
     of_samples = sample_findings(samples, windows.flags, windows.noise, clusters, swing, by_chance=by_chance)
-    motions = motion_findings(motion.cycles, motion)
-    return motions, damping_findings(motion.damping), notices, of_samples, fit_findings(motion)
+    several = several_findings(samples, motion, notices)
+    return several, motion_findings(motion), damping_findings(motion.damping), notices, of_samples, fit_findings(motion)

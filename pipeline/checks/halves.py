@@ -9,8 +9,8 @@ import numpy as np
 
 from pipeline.damping.law_fit import LawFit
 from pipeline.damping.select import Damping
-from pipeline.motion.fitted import Fitted
-from pipeline.motion.kinds import FittedMotion
+from pipeline.motion.fitted import Oscillation
+from pipeline.motion.kinds import Motion
 from pipeline.notice import Notice
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.halves import Difference, Points, difference
@@ -19,7 +19,7 @@ from pipeline.numerics.regression import Scatter
 from pipeline.track import F8
 
 
-def compare_halves(fitted: FittedMotion) -> tuple[FittedMotion, tuple[Notice, ...]]:
+def compare_halves(fitted: Motion) -> tuple[Motion, tuple[Notice, ...]]:
     """Return a fit whose covariances include that its halves differ, and the finding; the fit as it is if they agree.
 
     The halves are compared in one chi-square over the parameters of the damping law, of the phase, and of the rest
@@ -28,7 +28,7 @@ def compare_halves(fitted: FittedMotion) -> tuple[FittedMotion, tuple[Notice, ..
     """
     from scipy.special import chdtrc
 
-    if not isinstance(fitted, Fitted) or fitted.method == "equation":
+    if not isinstance(fitted, Oscillation) or fitted.method == "equation":
         return fitted, ()
     windows, damping, phase, rest = fitted.windows, fitted.damping, fitted.phase, fitted.rest
     of_law = _of_law(damping.best, damping, windows.t, windows.amplitude)

@@ -15,10 +15,9 @@ RECORDS = min(clean.RECORDS, int(os.environ.get("SPRINGMASS_TRIALS", "48")))
 
 # Kinds and files with values that are called sound and are wrong today. One that is mended is to be taken out.
 WRONG_KINDS = {
-    "strong-pendulum", "moving-rest", "turning-plane", "ellipse", "magnitude", "radial-acceleration", "magnet-pendulum",
-    "driven", "mains-hum", "pendulum-position", "pendulum-gyro", "cantilever-overtone",
+    "strong-pendulum", "moving-rest", "turning-plane", "ellipse", "pendulum-position", "pendulum-gyro",
 }  # fmt: skip
-WRONG_FILES = WRONG_KINDS - {"cantilever-overtone", "turning-plane"} | {"strong-creep"}
+WRONG_FILES = WRONG_KINDS - {"turning-plane"} | {"strong-creep"}
 
 pytestmark = pytest.mark.trials
 
