@@ -9,25 +9,27 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import NamedTuple
 
 from pipeline.analysis import Analysis, Motion, Oscillation
 from pipeline.bench.scene import Scene
 from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.checks.echoes import echoes_by_chance, find_clusters
 from pipeline.checks.judge import judge
+from pipeline.checks.residual import Misfit
 from pipeline.findings.finding import worded
 from pipeline.findings.motion import damping_findings, fit_findings, kind_findings, motion_findings
 from pipeline.findings.samples import clock_findings, part_findings, sample_findings
 from pipeline.findings.scene import scene_findings
 from pipeline.motion.at_rest import Rest
 from pipeline.motion.fitted import Fitted
-from pipeline.motion.kinds import fit_motion
+from pipeline.motion.kinds import FittedMotion, fit_motion
 from pipeline.motion.relaxation import Relaxation
 from pipeline.motion.two_modes import TwoModes
 from pipeline.notice import Notice
 from pipeline.numerics.threads import one_thread
 from pipeline.options import Options
-from pipeline.parts.part import find_part
+from pipeline.parts.part import Part, find_part
 from pipeline.results.derive import derive
 from pipeline.results.effects import tabulate
 from pipeline.samples.condition import Samples, condition
@@ -37,7 +39,16 @@ from pipeline.windows.cycles import Cycles
 __all__ = ["Analysis", "Oscillation", "Relaxation", "Rest", "TwoModes", "analyse"]
 
 
-@one_thread
+class Measured(NamedTuple):
+    """What follows from the samples: their part, the motion in it, and what is noticed about the two."""
+
+    part: Part
+    fitted: FittedMotion
+    notices: tuple[Notice, ...]
+    misfits: tuple[Misfit, ...]
+    options: Options
+
+
 def analyse(track: Track, scene: Scene | None = None, options: Options | None = None) -> Analysis:
     """Turn a track into estimates, laws, effects and findings.
 
@@ -51,7 +62,18 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
     >>> print(analyse(Track.from_arrays(t, y)).estimates["period"])  # 2 pi / 8.3 = 0.757010
     0.757010 +- 0.000022 s
     """
-    scene, options = scene or Scene(), options or Options()
+    scene = scene or Scene()
+    return conclude(measure(track, scene, options or Options()), scene)
+
+
+def of_samples(scene: Scene) -> tuple[object, ...]:
+    """Return what :func:`measure` uses of a scene: the stated law and the sensor."""
+    return scene.damping_law, *(value for name, value in vars(scene).items() if name.startswith("sensor_"))
+
+
+@one_thread
+def measure(track: Track, scene: Scene, options: Options) -> Measured:
+    """Fit the motion to the samples; of the scene, it needs the stated law and the sensor alone."""
     if options.stated is None and scene.damping_law is not None:
         options = replace(options, stated=scene.damping_law)
     if (ppm := scene.sensor_clock_ppm) is not None:
@@ -59,9 +81,15 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
     if track.unit == "m" and track.sigma_m is None and scene.sensor_sigma_m is not None:
         track = replace(track, sigma_m=scene.sensor_sigma_m.value)
     part = find_part(condition(track))
-    fitted, samples = fit_motion(part, options), part.samples
-    track = samples.track
-    notices, misfits = judge(samples, fitted, SensorFilter.of(scene, track.rate_hz), part.lost)
+    fitted = fit_motion(part, options)
+    notices, misfits = judge(part.samples, fitted, SensorFilter.of(scene, part.samples.track.rate_hz), part.lost)
+    return Measured(part, fitted, notices, misfits, options)
+
+
+def conclude(measured: Measured, scene: Scene) -> Analysis:
+    """Derive the results on a bench: the estimates, the effects and the findings."""
+    part, fitted, notices, misfits, options = measured
+    samples, track = part.samples, part.samples.track
     effects = tabulate(track, fitted, scene) if isinstance(fitted, Fitted) else ()
     derived = derive(track, fitted, scene, effects, misfits)
     constant = "spring_constant" in derived.estimates
