@@ -15,8 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.analyse import Analysis, analyse
-from pipeline.analysis import Oscillation
+from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.damping.laws import Law, find_law
 from pipeline.errors import DynamicsError, PipelineError
 from pipeline.options import TIERS, options_for

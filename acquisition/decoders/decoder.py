@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from acquisition.readings import Readings
 
@@ -22,6 +22,17 @@ class Identity:
 
     def __str__(self) -> str:
         return f"{self.model} {self.version}{f' named {self.name}' if self.name else ''}"
+
+
+class Guess(NamedTuple):
+    """What bytes look like, in words, and which options would read them, as alternatives with the likeliest first.
+
+    An alternative maps names of options of the family, or ``framing``, to their text; ``when`` says when it is right.
+    """
+
+    looks: str
+    alternatives: tuple[Mapping[str, str], ...] = ()
+    when: tuple[str, ...] = ()
 
 
 @dataclass(slots=True)
@@ -88,9 +99,9 @@ class Decoder(ABC):
         """Unit that is neither printed nor stated, and with which the distances are read; else empty."""
         return ""
 
-    def unread(self, data: bytes) -> str:
-        """Return what bytes look like that gave no reading, and which option of the family would read them."""
-        return "looks like another sensor"
+    def unread(self, data: bytes) -> Guess:
+        """Return what bytes look like that gave no reading, and which options of the family would read them."""
+        return Guess("looks like another sensor")
 
 
 class Encoder(Protocol):

@@ -9,6 +9,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from acquisition.decoders.decoder import Guess
 from acquisition.decoders.sensor import Sensor
 from acquisition.errors import SensorError
 from failure.extensions import entry_points_of, load_named
@@ -70,32 +71,31 @@ def probe(data: bytes) -> list[str]:
     ]
 
 
-def describe_bytes(data: bytes, unread: Mapping[str, Any] | None = None) -> str:
-    """Return a one-line description of bytes from a port, for the user.
+def describe_bytes(data: bytes, unread: Mapping[str, Any] | None = None) -> Guess:
+    """Return what bytes from a port look like, and which options would read them.
 
     ``unread`` are the options with which ``text-lines`` found no distance in the bytes.
     """
     if not data:
-        return "silence"
+        return Guess("silence")
     if names := [name for name in probe(data) if unread is None or name != "text-lines"]:
-        return "looks like " + " or ".join(f"{get_family(name).title} [{name}]" for name in names)
+        return Guess("looks like " + " or ".join(f"{get_family(name).title} [{name}]" for name in names))
     if len(set(data)) == 1:
-        return f"{len(data)} bytes, all 0x{data[0]:02X}: a line held at one level, or the wrong baud rate?"
+        return Guess(f"{len(data)} bytes, all 0x{data[0]:02X}: a line held at one level, or the wrong baud rate?")
     if is_text(data) and any(end in data for end in (b"\n", b"\r", b"*/")):
         return get_family("text-lines").decoder(**(unread or {})).unread(data)
     if is_text(data):
-        return (
-            f"looks like text without line ends ({data[:40].decode('ascii', 'replace')!r}): let the sketch use println"
-        )
+        start = data[:40].decode("ascii", "replace")
+        return Guess(f"looks like text without line ends ({start!r}): let the sketch use println")
     low = bytes(byte & 0x7F for byte in data)
     if is_text(low) and b"\n" in low:
         odd = sum(byte.bit_count() % 2 for byte in data) / len(data)
         form = "7E1" if odd < 0.02 else "7O1" if odd > 0.98 else "7M1" if min(data) > 127 else ""
         if form:
-            return f"looks like text lines of 7 data bits and a parity: add --framing {form}"
+            return Guess("looks like text lines of 7 data bits and a parity", ({"framing": form},))
     if (size := _frame_size(data)) is not None:
-        return f"looks like frames of {size} bytes of an unknown sensor"
-    return "looks like noise: wrong baud rate, or inverted polarity (RS-232 levels on a TTL adapter)?"
+        return Guess(f"looks like frames of {size} bytes of an unknown sensor")
+    return Guess("looks like noise: wrong baud rate, or inverted polarity (RS-232 levels on a TTL adapter)?")
 
 
 def is_text(data: bytes) -> bool:

@@ -16,6 +16,7 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any
 
+from acquisition.decoders.decoder import Guess
 from acquisition.decoders.frames import FramedDecoder, LineSplitter
 from acquisition.decoders.sensor import Sensor
 from acquisition.errors import SensorError
@@ -162,45 +163,39 @@ class TextLinesDecoder(FramedDecoder):
         """Whether numbers without a unit would be nearer than any sensor of this kind measures, if they were cm."""
         return self._smallest > 0.0 and self._largest < 100.0 * FAMILY.range_m[0]
 
-    def unread(self, data: bytes) -> str:
-        """Return what the lines look like that gave no reading, and which option would read them."""
+    def unread(self, data: bytes) -> Guess:
+        """Return what the lines look like that gave no reading, and which options would read them."""
         self.feed(0, data)
         if self._in_turn:
             names = ", ".join(self._in_turn)
-            column = _column_name(self._in_turn[0])
-            return f"looks like lines of several sensors in turn ({names}): state one, as in --option column={column}"
+            return Guess(f"looks like lines of several sensors in turn ({names})", ({"column": self._in_turn[0]},))
         if self._may_be_metres:
             span = f"{self._smallest:g} to {self._largest:g}"
-            return (
-                f"looks like distances without a unit ({span}), too short for cm: add --option unit=m, or the true unit"
-            )
+            looks = f"looks like distances without a unit ({span}), too short for cm"
+            return Guess(looks, ({"unit": "m"},), ("if they are metres",))
         splitter = LineSplitter(b"\n", LONGEST_TEXT_LINE, {"garbage_bytes": 0, "bad_frame": 0}, other_ends=OTHER_ENDS)
         lines = [text for line in splitter.split(data)[1:] if (text := _text(line))]
         distance_lines = [line for line in map(self._found, lines) if not all(number.is_other for number in line[1])]
         if not distance_lines:
-            return f"looks like text lines without a distance ({(lines or [''])[0][:40]!r})"
+            return Guess(f"looks like text lines without a distance ({(lines or [''])[0][:40]!r})")
         text, in_line, cells = distance_lines[-1]
         quoted = f"looks like text lines with numbers ({text[:40]!r})"
         if self._column is not None and _at(self._column, distance_lines[-1]) is None:
             listed = ", ".join(f"{_cell(each, cells)} is {each.value:g}" for each in in_line[:8])
-            return f"{quoted}, none at column {self._column}: of the columns, counted from 0, {listed}"
+            return Guess(f"{quoted}, none at column {self._column}: of the columns, counted from 0, {listed}")
         units = {number.unit for number in in_line if number.unit in LENGTHS_M}
         if units and self._unit and self._unit not in units:
-            return (
-                f"{quoted}, whose unit is {' and '.join(sorted(units))} and not {self._unit}; leave out --option unit"
-            )
+            return Guess(f"{quoted}, whose unit is {' and '.join(sorted(units))} and not {self._unit} as stated")
         if has_decimal_comma(text, self._separator) is None:
-            return (
-                f"{quoted}: add --option separator=space if the comma is a decimal comma, "
-                "or --option separator=comma --option column=1 if it separates the distance"
-            )
+            roles = "if the comma is a decimal comma", "if it separates the distance"
+            return Guess(quoted, ({"separator": "space"}, {"separator": "comma", "column": "1"}), roles)
         even = {cell for cell in (_cell(each, cells) for each in in_line) if _counts(cell, distance_lines)}
         likely = [each for each in in_line if not each.is_other and _cell(each, cells) not in even] or in_line
         if len(in_line) == 1 and even:
-            return f"{quoted} that count evenly: a clock or a counter; let the sketch print the distance"
-        time = f", --option time={min(even)} --option time_unit=ms for the one that counts evenly" if even else ""
-        example = f"--option column={_cell(likely[0], cells)}" + ("" if likely[0].unit else " --option unit=cm")
-        return f"{quoted}: state the column of the distance, counted from 0, and its unit: for example {example}{time}"
+            return Guess(f"{quoted} that count evenly: a clock or a counter; let the sketch print the distance")
+        options = {"column": str(_cell(likely[0], cells)), **({} if likely[0].unit else {"unit": "cm"})}
+        options |= {"time": str(min(even)), "time_unit": "ms"} if even else {}
+        return Guess(f"{quoted}, of which one is the distance", (options,), ("if these are its column and unit",))
 
     def _found(self, text: str) -> FoundNumber:
         comma = has_decimal_comma(text, self._separator)
@@ -263,11 +258,6 @@ def _at(where: int | str, line: FoundNumber) -> Number | None:
         named = [number for number in in_line if re.search(r"(?<!\w)" + name, number.before)]
         named = named or [each for each in in_line if re.search(r"(?<!\w)" + name, each.before, re.IGNORECASE)]
     return named[0] if len(named) == 1 else None
-
-
-def _column_name(words: str) -> str:
-    """Return a name that :func:`_at` finds, quoted for a shell if it has blanks."""
-    return f'"{words}"' if " " in words else words
 
 
 def _cell(number: Number, cells: list[tuple[int, int]]) -> int:

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -221,12 +221,20 @@ def without_beaten(fits: Mapping[str, LawFit]) -> dict[str, LawFit]:
     }
 
 
-def choose(fits: Mapping[str, LawFit], evidence: float, span: Callable[[str], F8]) -> tuple[str, tuple[str, ...]]:
-    """Return the selected law, and the admissible laws from best to worst; if all are rejected, the nearest and none.
+class LawChoice(NamedTuple):
+    """The selected law, the admissible laws from best to worst, and the idle ones, whose damping is a simpler law's."""
 
-    A law that contains the selected one as a special case is not admissible if its BIC is higher by more than 2, and
-    its damping, with twice its uncertainty, is within a tenth of the simpler law's at both ends of the span. The lower
-    end is at most a third of the largest amplitude, even if the record ends earlier.
+    selected: str
+    admissible: tuple[str, ...] = ()
+    idle: tuple[str, ...] = ()
+
+
+def choose(fits: Mapping[str, LawFit], evidence: float, span: Callable[[str], F8]) -> LawChoice:
+    """Select a law and list the admissible ones; if all are rejected, the nearest is selected and none is admissible.
+
+    A law that contains the selected one as a special case is idle if its BIC is higher by more than 2, and its damping,
+    with twice its uncertainty, is within a tenth of the simpler law's at both ends of the span. The lower end is at
+    most a third of the largest amplitude, even if the record ends earlier.
     """
     allowed = [name for name in fits if not fits[name].rejected]
     count = {name: len(fit.law.parameters) for name, fit in fits.items()}
@@ -235,7 +243,7 @@ def choose(fits: Mapping[str, LawFit], evidence: float, span: Callable[[str], F8
         damping = [name for name, fit in fits.items() if fit.rejection != "negative" and count[name] > 1]
         least = min(fits.values(), key=lambda fit: fit.bic).bic
         tolerable = [name for name in damping if fits[name].bic == least]
-        return (tolerable or [min(fits, key=lambda name: (fits[name].reduced_chi2, count[name]))])[0], ()
+        return LawChoice((tolerable or [min(fits, key=lambda name: (fits[name].reduced_chi2, count[name]))])[0])
     least = min(fits[name].bic for name in allowed)
     ties = [name for name in allowed if fits[name].bic - least < BARE_MENTION]
     selected = min(ties, key=lambda name: (count[name], list(fits).index(name)))
@@ -251,4 +259,4 @@ def choose(fits: Mapping[str, LawFit], evidence: float, span: Callable[[str], F8
             rate, u = fits[name].rates(amplitudes)
             if not np.all(np.abs(rate - alone) + 2.0 * u <= NEGLIGIBLE * alone):
                 idle.remove(name)
-    return selected, tuple(name for name in reach if name not in idle)
+    return LawChoice(selected, tuple(n for n in reach if n not in idle), tuple(n for n in reach if n in idle))

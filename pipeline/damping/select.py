@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pipeline.damping.law_fit import NEGATIVE, LawFit, choose, fit_law, least_chi2, weigh, without_beaten
+from pipeline.damping.law_fit import NEGATIVE, LawChoice, LawFit, choose, fit_law, least_chi2, weigh, without_beaten
 from pipeline.damping.laws import LAWS, Drag, Law, find_law, free_power
 from pipeline.errors import AnalysisError
 from pipeline.numerics.least_squares import Fit
@@ -35,9 +35,10 @@ class Damping:
     fits: Mapping[str, LawFit]  # every law that could be fitted, by name
     selected: str
     # Laws that the record does not contradict and whose BIC is near the lowest, from best to worst, without those that
-    # are equivalent to a simpler one.
+    # idle: their damping is that of the selected one, with other coefficients.
     admissible: tuple[str, ...]
     scatter: Scatter  # of the amplitudes about a smooth curve
+    idle: tuple[str, ...] = ()
     unfitted: Mapping[str, str] = field(default_factory=dict)  # the reason why a law has no fit, by name
     stated: str = ""  # the law that the user stated
 
@@ -63,14 +64,29 @@ class Damping:
         return -gamma.value if gamma is not None and gamma.value < -NEGATIVE * gamma.u else 0.0
 
     @property
+    def possible(self) -> tuple[str, ...]:
+        """The laws whose coefficients the record allows: the admissible ones, and idle ones with more drag of the air.
+
+        A bob in air has linear and quadratic drag, even if the record does not show both, and dry friction only where
+        something rubs. Without friction, the average over laws already allows for the other drag of the air.
+        """
+        law = self.best.law
+        rubbed = isinstance(law, Drag) and 0 in law.powers
+        return (*self.admissible, *(name for name in self.idle if rubbed))
+
+    @property
     def settled(self) -> bool:
-        """Whether the selected law is the only admissible one, so that its coefficients are meaningful."""
-        return self.admissible == (self.selected,)
+        """Whether the selected law is the only possible one, so that its coefficients are meaningful."""
+        return self.possible == (self.selected,)
 
     def of_powers(self, *powers: int) -> LawFit | None:
         """Return the fit of the law whose rate has exactly these powers of the amplitude; None if it has no fit."""
         fits = (fit for fit in self.fits.values() if isinstance(fit.law, Drag) and set(fit.law.powers) == set(powers))
         return next(fits, None)
+
+
+NO_LAWS = Damping(math.nan, {}, "", (), Scatter(np.empty(0), 0.0, np.empty(0, np.bool_), 1.0))
+"""The damping of a motion that is no oscillation."""
 
 
 def fit_laws(
@@ -114,10 +130,10 @@ def fit_laws(
     return found if enough else _fit_laws(points, t0, tuple(LAWS), known, unit)
 
 
-def select_law(fits: Mapping[str, LawFit], known: str, last_s: float) -> tuple[str, tuple[str, ...]]:
-    """Return the selected and the admissible laws, for a record of ``last_s`` seconds; a stated one stands alone."""
+def select_law(fits: Mapping[str, LawFit], known: str, last_s: float) -> LawChoice:
+    """Choose among the laws for a record of ``last_s`` seconds; a stated one stands alone."""
     if known in fits:
-        return known, () if fits[known].rejected else (known,)
+        return LawChoice(known, () if fits[known].rejected else (known,))
     ends = np.array([0.0, last_s])
     return choose(fits, STRONG, lambda name: fits[name].amplitude(ends))
 
@@ -170,12 +186,11 @@ def _fit_laws(points: _Points, t0: float, wanted: Sequence[str | Law], known: La
         raise AnalysisError("no damping law could be fitted to the amplitudes", "see the counts of flagged samples")
     fits = _with_growth(fits if points.coarse else without_beaten(fits))
     stated = "" if known is None else known.name
-    selected, admissible = select_law(fits, stated, float(points.t[-1]))
+    choice = select_law(fits, stated, float(points.t[-1]))
     return Damping(
+        **choice._asdict(),
         t0=t0,
         fits=fits,
-        selected=selected,
-        admissible=admissible,
         scatter=points.spread,
         unfitted=unfitted,
         stated=stated,

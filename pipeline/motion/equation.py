@@ -24,7 +24,7 @@ from pipeline.dynamics.integrator import Trajectory
 from pipeline.dynamics.strang import STRANG
 from pipeline.modes.mode import Modes
 from pipeline.motion.fit import Rows, clipped, fit
-from pipeline.motion.fitted import Fitted, Phase, RestPosition, Waveform, wrapped
+from pipeline.motion.fitted import Oscillation, Phase, RestPosition, Waveform, wrapped
 from pipeline.motion.relaxation import LEAST_DAMPING
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import CENTRAL_STEP, Fit, central_differences
@@ -203,7 +203,7 @@ class Solved:
 LONGEST_SOLVED = 250
 
 
-def fit_equation(samples: Samples, windows: Windows, damping: Damping, *, stopped: bool) -> Fitted | str | None:
+def fit_equation(samples: Samples, windows: Windows, damping: Damping, *, stopped: bool) -> Oscillation | str | None:
     """Fit the equation of motion if the damping requires it; return the reason if that fails.
 
     The result is None if damping is weak, if no law with damping can be fitted, or if linear drag or no damping is
@@ -379,19 +379,18 @@ def _chosen(
     laws = {name: by_name[name].law for name in fits}
     least, points = least_chi2(minima, laws), int(np.count_nonzero(rows.used)) - len(STATE) + 1
     weighed = {n: weigh(laws[n], minima[n], least[n], points, correlation, unit) for n in fits}
-    selected, admissible = select_law(weighed, damping.stated, float(np.max(rows.t)))
+    choice = select_law(weighed, damping.stated, float(np.max(rows.t)))
     scatter = replace(damping.scatter, correlation=correlation)
     every = Damping(
+        **choice._asdict(),
         t0=damping.t0,
         fits=weighed,
-        selected=selected,
-        admissible=admissible,
         scatter=scatter,
         unfitted=unfitted,
         stated=damping.stated,
     )
-    own = fits[selected]
-    return every, by_name[selected], replace(own, covariance=own.covariance * correlation)
+    own = fits[choice.selected]
+    return every, by_name[choice.selected], replace(own, covariance=own.covariance * correlation)
 
 
 def _by_envelope(model: Solved, own: Fit) -> Fit:
@@ -412,7 +411,7 @@ def _by_envelope(model: Solved, own: Fit) -> Fit:
 
 def _described(
     samples: Samples, windows: Windows, damping: Damping, model: Solved, rows: Rows, own: Fit
-) -> Fitted | str:
+) -> Oscillation | str:
     """Return the oscillation by the solution, or what was fitted if no oscillation is left.
 
     Its squared frequency is :math:`\\omega_0^2` minus the mean decrease by drag over the whole time: to second order,
@@ -461,7 +460,7 @@ def _described(
     # The rest position is the constant one of the record; the place where friction holds the bob may differ.
     rest = RestPosition(Estimate(still, float(u[0]), unit), 0.0, False, t, np.full(t.size, still))
     waveform = Waveform(position, partial(np.asarray, model.motion.velocity(rows.t, theta)), residual, rms)
-    return Fitted(
+    return Oscillation(
         windows=windows,
         modes=Modes(samples),
         damping=damping,

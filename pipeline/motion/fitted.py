@@ -87,7 +87,7 @@ Method = Literal["windows", "samples", "equation"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Fitted:
+class Oscillation:
     """An oscillation in the form that the stages after the fit use."""
 
     windows: Windows  # the windows, with the final flags

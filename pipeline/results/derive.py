@@ -23,8 +23,8 @@ from pipeline.damping.laws.drag import COEFFICIENTS
 from pipeline.damping.local import local_decay
 from pipeline.damping.select import Damping
 from pipeline.motion.at_rest import Rest
-from pipeline.motion.fitted import Fitted, Phase
-from pipeline.motion.kinds import FittedMotion
+from pipeline.motion.fitted import Oscillation, Phase
+from pipeline.motion.kinds import Motion
 from pipeline.motion.relaxation import Relaxation
 from pipeline.motion.two_modes import TwoModes
 from pipeline.numerics.estimate import Estimate, Joint, UpperLimit
@@ -34,7 +34,6 @@ from pipeline.quantities import QUANTITIES
 from pipeline.results.ambient import Ambient
 from pipeline.results.budget import Budget, Inputs, function_of, joint_of
 from pipeline.results.closed_form import closed_form
-from pipeline.results.curves import Curve, drag_curve, energy_curve
 from pipeline.results.effects import Effect
 from pipeline.results.formulas import solve
 from pipeline.track import F8, UNUSABLE, Quality, Track
@@ -110,20 +109,9 @@ class Derived:
         """Factor from amplitudes of the record to those of the motion, before the filter of a sensor."""
         return Estimate.of_variable(self.scales[1], "").value
 
-    def energy_curve(self, damping: Damping, windows: Windows) -> Curve | None:
-        """Return the mechanical energy against time with its band, in J, or in J/kg if no mass is known."""
-        if self.half_stiffness is None:
-            return None
-        unit = "J/kg" if self.effective_mass_kg is None else "J"
-        return energy_curve(damping, windows, self.half_stiffness, self.laws, unit)
-
-    def drag_curve(self, damping: Damping, windows: Windows) -> Curve | None:
-        """Return the drag coefficient against amplitude with its band."""
-        return None if self.drag_length is None else drag_curve(damping, windows, self.drag_length, self.laws)
-
 
 def derive(
-    track: Track, motion: FittedMotion, scene: Scene, effects: tuple[Effect, ...], misfits: tuple[Misfit, ...]
+    track: Track, motion: Motion, scene: Scene, effects: tuple[Effect, ...], misfits: tuple[Misfit, ...]
 ) -> Derived:
     """Calculate the results of a run by :mod:`pipeline.results.formulas`, and propagate their uncertainties.
 
@@ -139,7 +127,7 @@ def derive(
     :math:`x = \\sum_i w_i x_i` and :math:`u^2 = \\sum_i w_i (u_i^2 + (x_i - x)^2)`.
     """
     inputs, unit = Inputs(), track.unit
-    if not isinstance(motion, Fitted):
+    if not isinstance(motion, Oscillation):
         return _closed(track, motion, scene, inputs)
     fitted = motion
     laws = _Laws(fitted.damping, inputs, fitted.windows)
@@ -225,7 +213,7 @@ _LENGTHS = ("m", "m/s", "m/s^2")  # units in which a displacement, or a derivati
 
 
 def _of_motion(
-    track: Track, fitted: Fitted, misfits: tuple[Misfit, ...], laws: _Laws, inputs: Inputs
+    track: Track, fitted: Oscillation, misfits: tuple[Misfit, ...], laws: _Laws, inputs: Inputs
 ) -> dict[str, Any]:
     """Return the inputs of the formulas that the recording and its fit give; None for what they do not determine."""
     windows, damping, phase, rest = fitted.windows, fitted.damping, fitted.phase, fitted.rest
@@ -288,7 +276,7 @@ def _of_scene(track: Track, scene: Scene, included: set[str], inputs: Inputs) ->
         "unstated_spring_mass": stated("unstated_spring_mass", unstated),
         "of_added_mass": "added_mass" in included or None,
         # An angle may be that of a pendulum, so a spring constant is given only if the scene has a spring.
-        "of_spring": not track.unit.startswith("rad") or spring is not None or None,
+        "of_spring": (scene.hangs_on_spring and not track.unit.startswith("rad")) or spring is not None or None,
     }
 
 

@@ -75,7 +75,7 @@ def join(runs: Sequence[tuple[str, Damping, float]]) -> JointDamping:
     def span(name: str) -> F8:
         return np.array([fits[name].joint.values[0], fits[name].smallest_m])
 
-    selected, admissible = choose(fits, STRONG, span)
+    selected, admissible, _ = choose(fits, STRONG, span)
     names = tuple(name for name, _, _ in runs)
     return JointDamping(names, fits, selected, admissible, _message(names, fits, selected, admissible))
 

@@ -11,7 +11,6 @@ from decimal import Decimal, InvalidOperation
 import numpy as np
 
 from acquisition.units import measure_of, time_unit
-from pipeline.analyse import Oscillation
 from pipeline.findings.finding import Finding, by_severity, word
 from pipeline.notice import Notice
 from pipeline.numerics.estimate import Estimate
@@ -148,14 +147,14 @@ def _value(row: Reported, run: Run, others: Mapping[str, Run]) -> tuple[str, Not
 
     The factor is None where the uncertainty of the value cannot be judged.
     """
-    expected, motion = _expected(run, row.name), run.analysis.motion
+    expected = _expected(run, row.name)
     ours = expected[0]
     about = {"run": row.run, "name": _word(row.name), "printed": row.printed, "ours": str(ours)}
     if row.name == "noise":
         if ours.value < TOO_SMALL * row.value and row.value < TOO_SMALL * ours.value:
             return "agrees", None, None
         return "not the noise of a sample", Notice("reported_not_noise", about), None
-    linear = motion.damping.fits.get("linear") if isinstance(motion, Oscillation) else None
+    linear = run.analysis.damping.fits.get("linear")
     if row.name in ("damping_rate", "gamma") and linear is not None and linear.rejection:
         if _agrees(run, row, ours):
             return "agrees", None, 1.0

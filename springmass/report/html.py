@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from acquisition.errors import visible
-from pipeline.analyse import Oscillation
 from pipeline.findings.finding import kinds
 from pipeline.numerics.estimate import Estimate
 from pipeline.quantities import EFFECTS, INPUTS
@@ -175,7 +174,7 @@ def tables_of(runs: Sequence[Run]) -> Iterator[dict[str, Any]]:
 def _part(index: int, run: Run, charts: Mapping[str, Chart], figures: Figures, stem: str) -> dict[str, Any]:
     """Return everything that the template needs about one run."""
     analysis, quality, given = run.analysis, run.result["quality"], run.result["input"]
-    motion, title = analysis.motion, str(run.recorded.get("title") or given.get("title") or "")
+    title = str(run.recorded.get("title") or given.get("title") or "")
     ordered = [*(name for name in _QUALITY if name in quality), *(name for name in quality if name not in _QUALITY)]
     return {
         "name": run.name,
@@ -191,7 +190,7 @@ def _part(index: int, run: Run, charts: Mapping[str, Chart], figures: Figures, s
         "method": method(analysis),
         "figures": {name: figures.add(chart, stem, index) for name, chart in charts.items()},
         "notices": notices_of(run.result["findings"], charts),
-        "laws": laws_of(motion) if isinstance(motion, Oscillation) else None,
+        "laws": laws_of(analysis),
         "budgets": budgets_of(analysis),
         "effects": analysis.effects,
         "quality": [(_cause(name, analysis.track), quality[name]) for name in ordered],

@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipeline.analyse import Analysis, Measured, Oscillation, Relaxation, conclude, measure, of_samples
+from pipeline.analyse import Analysis, Measured, conclude, measure, of_samples
 from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError
 from pipeline.findings.finding import Finding
@@ -159,18 +159,17 @@ class Run(Mapping[str, Estimate]):
     @property
     def ok(self) -> bool:
         """Whether the run oscillates or relaxes, so that there is something to report."""
-        return isinstance(self.analysis.motion, Oscillation | Relaxation)
+        return self.analysis.ok
 
     @property
     def why(self) -> str:
         """Why the run is not ``ok``, as a sentence; empty if it is."""
-        return "" if isinstance(self.analysis.motion, Oscillation | Relaxation) else self.analysis.motion.why
+        return "" if self.ok else self.analysis.motion.why
 
     @property
     def law(self) -> str | None:
         """The name of the damping law that fits best or is stated; None without an oscillation."""
-        motion = self.analysis.motion
-        return motion.damping.selected if isinstance(motion, Oscillation) else None
+        return self.analysis.damping.selected or None
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -188,7 +187,7 @@ class Run(Mapping[str, Estimate]):
         return table_rows([self.analysis])
 
     def __getitem__(self, name: str) -> Estimate:
-        everything, motion = numbers_of(self.analysis), self.analysis.motion
+        everything, fits = numbers_of(self.analysis), self.analysis.damping.fits
         if name in everything:
             return everything[name]
         for row in self.rows:
@@ -196,8 +195,8 @@ class Run(Mapping[str, Estimate]):
             if estimate is not None and name in (row.symbol, row.on_screen):
                 return estimate
         law, _, parameter = name.partition(".")
-        if isinstance(motion, Oscillation) and law in motion.damping.fits:
-            parameters = motion.derived.parameters_of(motion.damping.fits[law])
+        if law in fits:
+            parameters = self.analysis.derived.parameters_of(fits[law])
             if parameter in parameters:
                 return parameters[parameter]
         if name in ("spring_constant", "k") and self.scene.bob_mass_kg is None and "period" in everything:
@@ -239,7 +238,7 @@ class Run(Mapping[str, Estimate]):
             raise AnalysisError(f"no chart {chart!r}", f"there are {', '.join(CHARTS)}")
         drawn = CHARTS[chart](self.analysis)
         if drawn is None:
-            if not isinstance(self.analysis.motion, Oscillation):
+            if self.analysis.oscillation is None:
                 raise AnalysisError(f"only its position can be drawn, nothing oscillates: {self.analysis.motion.why}")
             needs = (
                 "[bob] mass_kg, [disc] diameter_m and an amplitude that falls" if chart == "drag" else "more periods"

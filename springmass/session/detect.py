@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import shlex
 from collections.abc import Sequence
 
 from acquisition.clock import SystemClock
+from acquisition.decoders.decoder import Guess
 from acquisition.decoders.registry import describe_bytes, probe
 from acquisition.errors import PortError
 from acquisition.live.serial_port import SerialPort, list_ports
@@ -13,6 +15,18 @@ from springmass.errors import LOG, SENSOR, ProgramError
 
 PROBE_S = 1.0
 PROBED_BAUDS = (115200, 9600)
+
+
+def described(guess: Guess) -> str:
+    """Return what bytes look like, and the options of the command line that would read them."""
+    offers = []
+    for options, when in zip(guess.alternatives, (*guess.when, ""), strict=False):
+        words = [
+            f"--framing {text}" if name == "framing" else f"--option {shlex.quote(f'{name}={text}')}"
+            for name, text in options.items()
+        ]
+        offers.append(" ".join(words) + (f" {when}" if when else ""))
+    return f"{guess.looks}: add {', or '.join(offers)}" if offers else guess.looks
 
 
 def name_sensors(
@@ -63,8 +77,8 @@ def listen(
             return str(error), [], baud
         families = probe(heard) if heard else []
         if families:
-            return f"{describe_bytes(heard)} at {baud} baud", families, baud
-    return describe_bytes(heard), [], bauds[-1]
+            return f"{described(describe_bytes(heard))} at {baud} baud", families, baud
+    return described(describe_bytes(heard)), [], bauds[-1]
 
 
 def _bytes_of(device: str, baud: int, framing: str, wait_s: float, send: bytes) -> bytes:

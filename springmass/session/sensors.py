@@ -17,6 +17,7 @@ from acquisition.live.serial_port import SerialPort
 from acquisition.live.timebase import WRAP_US
 from acquisition.readings import Reading
 from springmass.errors import SENSOR, ProgramError
+from springmass.session.detect import described
 from storage.wire_log.records import SensorEntry
 
 ANSWERED = 12
@@ -82,7 +83,7 @@ class OpenSensor:
         """Return an error that describes what was received instead of readings."""
         what = "not a byte came; is the sensor powered, its line on the right pin, or does it wait for --send TEXT?"
         if heard:
-            what = describe_bytes(heard, self.options if self.family.name == "text-lines" else None)
+            what = described(describe_bytes(heard, self.options if self.family.name == "text-lines" else None))
         wrong = f"{self.port.name}: a {self.family.name} sensor at {self.baud} baud was expected, {what}"
         return ProgramError(wrong, "see `springmass ports` for --sensor and --baud", SENSOR)
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.analysis import Analysis, Oscillation
+from pipeline.analyse import Analysis, Oscillation
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.track import F8
@@ -67,11 +67,11 @@ def scene_from_run(scene: Scene, analysis: Analysis, *, damping: bool = True) ->
 
 def oscillation_of(analysis: Analysis) -> Oscillation:
     """Return the oscillation of a run; refuse a run without one."""
-    if not isinstance(analysis.motion, Oscillation):
+    if (motion := analysis.oscillation) is None:
         raise ProgramError(
             f"{analysis.motion.why}: nothing to lay a prediction over", "name a run that oscillates", UNREADABLE
         )
-    return analysis.motion
+    return motion
 
 
 def _covariance(motion: Oscillation) -> F8:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from acquisition.errors import visible
-from pipeline.analyse import Analysis, Oscillation
+from pipeline.analyse import Analysis
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import Classic
 from pipeline.several.compare import Comparison
@@ -105,8 +105,8 @@ def comparison_text(comparison: Comparison, analyses: Sequence[Analysis], style:
 
     rows = [("period", "mass that swings", "spring constant", "residual / u")]
     for analysis, k, pull in zip(analyses, comparison.each, comparison.pulls, strict=True):
-        mass = analysis.motion.derived.effective_mass_kg if isinstance(analysis.motion, Oscillation) else None
-        rows.append((form(analysis.estimates["period"]), form(mass), form(k), f"{pull:+.1f}"))
+        period, mass = analysis.estimates["period"], analysis.derived.effective_mass_kg
+        rows.append((form(period), form(mass), form(k), f"{pull:+.1f}"))
     # Constants that disagree have no meaningful mean.
     mean = form(comparison.spring_constant) if comparison.agree else "none"
     rows.append(("", "", mean, f"chi2 {comparison.chi2:.3g} / {comparison.dof}"))

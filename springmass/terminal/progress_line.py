@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pipeline.analyse import Oscillation
 from springmass.runs.rolling import NotYet
 from springmass.session.live_state import Progress, TroubleKind
 from springmass.terminal.console import Console
@@ -64,11 +63,11 @@ def _parts(progress: Progress, style: TerminalStyle) -> list[str]:
     motion = NotYet("listening") if listening else progress.motion()
     if isinstance(motion, NotYet):
         parts.append(motion.why)
-    elif isinstance(oscillation := motion.analysis.motion, Oscillation):
+    elif motion.analysis.oscillation is not None:
         form, estimates = concise if style.terminal else shown, motion.analysis.estimates
         parts += [f"T {form(estimates['period'], style)}", f"A {form(estimates['amplitude'], style)}"]
     else:
-        parts.append(oscillation.why)
+        parts.append(motion.analysis.motion.why)
     parts.append(f"{progress.rate_hz:.0f} Hz")
     parts.append(f"{progress.missing} missing" + (f", {progress.gaps} gaps" if progress.gaps else ""))
     if progress.status is not None:

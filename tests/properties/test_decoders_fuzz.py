@@ -20,6 +20,7 @@ from hypothesis import strategies as st
 from acquisition.decoders.registry import describe_bytes, families, probe
 from acquisition.decoders.sensor import Sensor
 from acquisition.readings import Reading
+from springmass.session.detect import described
 from tests.encoders import crc16, frames
 from tests.properties.test_formats_fuzz import spoil
 
@@ -166,7 +167,7 @@ def test_its_own_stream_spoiled_is_back_in_step_within_two_frames(
 @given(data=st.binary(max_size=400))
 def test_describing_bytes_never_fails_and_takes_one_line(data: bytes) -> None:
     """Whatever a port has to offer; bytes without structure are no family's."""
-    line = describe_bytes(data)
+    line = described(describe_bytes(data))
     assert line
     assert "\n" not in line
     assert line.isprintable()

@@ -126,8 +126,7 @@ REPORT_DISC = REPORT_BARE | {
 def test_disc_drag_falls_with_amplitude() -> None:
     """The disc's drag coefficient is near 4 at 50 mm and near 8 at 15 mm, by the law and by slopes without one."""
     scene = Scene.from_mapping(REPORT_DISC | {"air": {"temperature_c": {"value": 21.0, "u": 2.0}}})
-    motion = motion_of(analyse(analysed(DISC).track, scene))
-    curve = motion.derived.drag_curve(motion.damping, motion.windows)
+    curve = analyse(analysed(DISC).track, scene).drag_curve()
     assert curve is not None
     assert float(np.interp(0.050, curve.x, curve.y)) == pytest.approx(4.3, abs=0.6)
     assert float(np.interp(0.015, curve.x, curve.y)) == pytest.approx(7.8, abs=1.5)

@@ -117,11 +117,11 @@ def one_record(drag: str, seconds: float, noise_m: float, seed: int) -> tuple[li
     motion: Any = analysis.motion
     assert isinstance(motion, Oscillation)
     # Clock and scale are exact here: what the record's own scatter says is held against it.
-    stated = {name: (e.value, motion.derived.budgets[name].u_of("A")) for name, e in analysis.estimates.items()}
-    for name, e in motion.derived.coefficients.items():
+    stated = {name: (e.value, analysis.derived.budgets[name].u_of("A")) for name, e in analysis.estimates.items()}
+    for name, e in analysis.derived.coefficients.items():
         if not truth(drag).get(name, 1.0):
             continue  # of one drag only, the other is stated where chance shows it, and not quoted
-        stated[name] = e.value, motion.derived.budgets[name].u_of("A")
+        stated[name] = e.value, analysis.derived.budgets[name].u_of("A")
     fit = motion.damping.fits.get("linear+quadratic" if drag in WITHIN else drag)
     own = {}
     if fit is not None:

@@ -15,6 +15,7 @@ from __future__ import annotations
 import datetime
 import math
 import re
+import unicodedata
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
@@ -42,7 +43,9 @@ CLOCK = re.compile(
 _SEARCHED = re.compile(rf"(?<!\d)(?<!\d\.){_CORE}(?![\d:])", re.ASCII)
 _COMPACT = re.compile(r"(?<!\d)(\d{4})(\d\d)(\d\d)[t ]?(\d\d)(\d\d)(\d\d)(?=[.,z+-]|$)")
 _DATE = re.compile(r"\d{1,4} ?[-./] ?\d{1,2} ?[-./] ?\d{1,4}\.?[t,]?|\d{4}")
+_WORD = re.compile(r"[^\W\d_][^\s\d_.,:;/\\-]*")  # with the vowel signs of Indian scripts, which are no letters
 _ZONE = re.compile(r"^ ?[+-]\d\d:?\d\d|\b(utc|gmt|z|ce?s?t|uhr|kl)\b\.?")
+_NUMBERED_MONTH = re.compile(r" ?,? th(?:g|áng) (\d\d?),? ")  # 17 tháng 4, 2025
 _SIGNS_OF_TIME = str.maketrans(
     {
         **dict.fromkeys("年月년월", "-"),
@@ -81,14 +84,15 @@ def clock_s(cell: str) -> ClockTime | None:
         return None
     if match is not None:
         return _clock(match, _numeric_day((match["date"] or "").strip(" ,T")), (match["half"] or "").lower()[:1])
-    text = _COMPACT.sub(r"\1-\2-\3 \4:\5:\6", cell.casefold().translate(_SIGNS_OF_TIME)).strip(" '")
+    text = unicodedata.normalize("NFC", cell.casefold()).translate(_SIGNS_OF_TIME)
+    text = _COMPACT.sub(r"\1-\2-\3 \4:\5:\6", _NUMBERED_MONTH.sub(r"-\1-", text)).strip(" '")
     match = _SEARCHED.search(text)
     if match is None:
         return None
     beside = f"{text[: match.start()]} {_ZONE.sub('', text[match.end() :])}"
     half = "p" if PM.search(beside) else "a" if AM.search(beside) else ""
     beside = (PM if half == "p" else AM).sub("", beside).strip(" ,:[]")
-    months = [month for word in re.findall(r"[^\W\d_]+", beside) if (month := _month(word))]
+    months = [month for word in _WORD.findall(beside) if (month := _month(word))]
     numbers = [int(each) for each in re.findall(r"\d+", beside)]
     if not re.search(r"\w", beside):
         return _clock(match, 0, half)

@@ -38,29 +38,29 @@ SPAN = _pattern(r"^(?-i:T)\b|^[Ττ]|period|durat|dauer|half|halb|interval|tau|d
 AM = _pattern(
     r"(?<![^\W\d_])"
     r"(?:a\.? ?m\.?|de\.|öö|дп|לפנה״צ"
-    r"|πμ|π\.μ\.|ص|ق\.ظ\.|上午|午前|早上|오전|sa|fm|f\.m\.|dop\.|vm\.?|vorm\.)(?![^\W\d_])"
+    r"|ap\.|πμ|π\.μ\.|ص|ق\.ظ\.|上午|午前|早上|오전|sa|fm|f\.m\.|dop\.|vm\.?|vorm\.)(?![^\W\d_])"
 )
 PM = _pattern(
     r"(?<![^\W\d_])"
     r"(?:p\.? ?m\.?|du\.|ös|пп|אחה״צ"
-    r"|μμ|μ\.μ\.|م|ب\.ظ\.|下午|午後|晚上|오후|ch|em|e\.m\.|odp\.|nm\.?|nachm\.)(?![^\W\d_])"
+    r"|ip\.|μμ|μ\.μ\.|م|ب\.ظ\.|下午|午後|晚上|오후|ch|em|e\.m\.|odp\.|nm\.?|nachm\.)(?![^\W\d_])"
 )
 """Words for the halves of the day; the word for the second half is looked for first."""
 MONTHS = tuple(
     words(stems)
     for stems in (
-        "jan gen ene янв січ ιαν oca sty led tammi jän كانون يناير",
-        "feb fév fev фев лют φεβ şub lut úno helmi فبراير",
-        "mar mär mrt мар бер μαρ bře maalis mär مارس",
-        "apr avr abr апр кві απρ nis kwi dub huhti ápr أبريل",
-        "may mai mei mag maj máj мая май тра μαΐ μαϊ μάι kvě touko مايو",
-        "jun juin giu июн чер ιουν haz cze čvn červn kesä jún يونيو",
-        "jul juil lug июл лип ιουλ tem lip čvc červenec heinä júl يوليو",
-        "aug ago aoû aou авг сер αυγ ağu sie srp elo أغسطس",
-        "sep set сен вер σεπ eyl wrz zář syys szep سبتمبر",
-        "oct okt ott out окт жов οκτ eki paź říj loka أكتوبر",
-        "nov noi ноя лис νοέ νοε kas lis marras نوفمبر",
-        "dec dez déc dic дек гру δεκ ara gru pro joulu ديسمبر",
+        "jan gen ene янв січ ιαν oca sty led tammi jän كانون يناير जन בינו ژانویه ian яну јан",
+        "feb fév fev фев лют φεβ şub lut úno helmi فبراير फ़र בפבר فوریه veebr фебр",
+        "mar mär mrt мар бер μαρ bře maalis مارس मार्च במרץ maart márc",
+        "apr avr abr апр кві απρ nis kwi dub huhti ápr أبريل अप्रैल באפר آوریل",
+        "may mai mei mag maj máj мая май тра μαΐ μαϊ μάι kvě touko مايو मई במאי مه",
+        "jun juin giu июн чер ιουν haz cze čvn červn kesä jún يونيو जून ביונ ژوئن iun юни јун",
+        "jul juil lug июл лип ιουλ tem lip čvc červenec heinä júl يوليو जुल ביול ژوئیه iul юли јул červenc",
+        "aug ago aoû aou авг сер αυγ ağu sie srp elo أغسطس अग באוג اوت agu",
+        "sep set сен вер σεπ eyl wrz zář syys szep سبتمبر सित בספט سپتامبر",
+        "oct okt ott out окт жов οκτ eki paź říj loka أكتوبر अक्टू באוק اکتبر",
+        "nov noi ноя лис νοέ νοε kas lis marras نوفمبر नव בנוב نوامبر ное",
+        "dec dez déc dic дек гру δεκ ara gru pro joulu ديسمبر दिस בדצמ دسامبر des dis дец",
     )
 )
 """Stems of the names of the twelve months; the longest that fits decides."""

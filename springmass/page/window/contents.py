@@ -9,7 +9,6 @@ from typing import Any
 from acquisition.errors import NeedsAnswer, visible
 from acquisition.recordings.identify import get_format
 from acquisition.recordings.questions import Missing, MissingItem
-from pipeline.analyse import Oscillation
 from springmass.charts.chart import Chart, to_json
 from springmass.charts.run import charts_of, recording
 from springmass.comparing.comparison import SpringComparison, line_and_hooke_words
@@ -128,7 +127,7 @@ def results_of(run: Run) -> dict[str, Any]:
         ],
         "method": [in_fields(text) for text in method(analysis)],
         "bench": bench_words(analysis.scene).partition(";")[0],
-        "law": run.law if isinstance(analysis.motion, Oscillation) else None,
+        "law": run.law,
         "charts": drawn(charts),
     }
 

@@ -37,8 +37,7 @@ REFUSED = "a fit that is right is refused, because an average of samples has les
 
 FAILURES: Mapping[str, Failure] = {
     "friction: stops the bob, 1 mm/s": Failure(QUOTED, 14),
-    "friction: stops the bob, 2 mm/s": Failure(QUOTED, 2),
-    "friction: stops the bob, 4 mm/s": Failure(QUOTED, 3),
+    "friction: stops the bob, 4 mm/s": Failure(QUOTED, 8),
     "averaging sensor: 2 samples, ratio 0.02": Failure(REFUSED, 1),
     "averaging sensor: 4 samples, ratio 0.05": Failure(REFUSED, 1),
     **{

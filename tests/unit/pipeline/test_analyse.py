@@ -52,7 +52,7 @@ def test_agrees_with_a_waveform_fit_by_lmfit(
     }
     pairs["gamma"] = motion.damping.fits["linear"].joint["gamma"], params["g"]
     held = {name: (found, x.value, x.stderr) for name, (found, x) in pairs.items()}
-    held["period"] = motion.derived.statistical["period"], 2 * math.pi / omega, 2 * math.pi / omega**2 * u_omega
+    held["period"] = result.derived.statistical["period"], 2 * math.pi / omega, 2 * math.pi / omega**2 * u_omega
     for name, (found, value, u) in held.items():
         assert abs(found.value - value) <= near * u, name
         assert found.u == pytest.approx(u, rel=alike), name
@@ -141,11 +141,11 @@ def test_amplitude_and_phase_are_of_the_first_row_though_an_echo_stands_there(lo
     """False echoes at the beginning move neither the moment that numbers are stated for nor what they say of it."""
     truth, t = synthetic.Truth(gamma=0.05), synthetic.times(20.0)
     y = synthetic.noisy(truth, t, 3e-4, 3)
-    clean = motion_of(analyse(Track.from_arrays(t + 7.0, y)))
+    clean = analyse(Track.from_arrays(t + 7.0, y))
     y[:lost] = 1.3
-    found = motion_of(analyse(Track.from_arrays(t + 7.0, y)))
+    found = analyse(Track.from_arrays(t + 7.0, y))
     for name in ("amplitude", "phase"):
-        one, other = found.derived.estimates[name], clean.derived.estimates[name]
+        one, other = found.estimates[name], clean.estimates[name]
         assert abs(one.value - other.value) < 0.5 * max(one.u, other.u), name
 
 

@@ -33,7 +33,7 @@ def test_the_bytes_of_a_family_are_recognised(family: Sensor) -> None:
     data = stream(family)
     for start in (0, 1) if family.self_framing else (0,):
         assert set(probe(data[start:])) == LOOK_ALIKE.get(family.name, {family.name})
-    assert f"[{family.name}]" in describe_bytes(data)
+    assert f"[{family.name}]" in describe_bytes(data).looks
 
 
 @pytest.mark.parametrize(

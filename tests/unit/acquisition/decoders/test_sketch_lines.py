@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from typing import Any
 
 import numpy as np
@@ -115,9 +114,9 @@ def test_lines_of_several_numbers_are_quoted_and_asked_about(template: str, dist
     """No reading; what is to be typed names a column that does not count."""
     data = lines(template)
     assert len(get_family("text-lines").decoder().feed(0, data)) == 0
-    question = describe_bytes(data)
-    assert "\n" not in question
-    options = dict(re.findall(r"--option (\w+)=(\w+)", question))
+    guess = describe_bytes(data)
+    assert "\n" not in guess.looks
+    options = dict(guess.alternatives[0])
     assert options["column"] == distance
     assert len(get_family("text-lines").decoder(**options).feed(0, data)) == 40
 
@@ -125,18 +124,15 @@ def test_lines_of_several_numbers_are_quoted_and_asked_about(template: str, dist
 def test_two_groups_of_digits_with_a_comma_are_no_distance_until_it_is_said_what_the_comma_is() -> None:
     """Either option that is offered reads the lines."""
     data = b"\n26,87 cm\n26,07 cm\n"
-    offered = re.findall(r"--option separator=(\w+)(?: --option column=(\d))?", describe_bytes(data))
-    read = [
-        get_family("text-lines").decoder(separator=separator, column=column or "auto").feed(0, data).distance_m.tolist()
-        for separator, column in offered
-    ]
+    offered = describe_bytes(data).alternatives
+    read = [get_family("text-lines").decoder(**options).feed(0, data).distance_m.tolist() for options in offered]
     assert read == [pytest.approx([0.2687, 0.2607]), pytest.approx([0.87, 0.07])]
 
 
 @pytest.mark.parametrize("column", [5, "height"])
 def test_a_column_that_is_not_there_is_named_with_those_that_are(column: int | str) -> None:
     """Not as lines that look right."""
-    said = describe_bytes(lines("{t};{d:.2f}"), {"column": column})
+    said = describe_bytes(lines("{t};{d:.2f}"), {"column": column}).looks
     assert f"column {column}" in said
     assert "1950" in said
 

@@ -9,6 +9,7 @@ import pytest
 
 from acquisition.decoders.registry import describe_bytes, get_family, probe
 from acquisition.readings import Readings
+from springmass.session.detect import described
 
 DISTANCES_CM = [round(26.9 + 5.2 * math.cos(0.2 * i), 2) for i in range(40)]
 
@@ -68,7 +69,7 @@ def test_two_sensors_in_turn_are_asked_about() -> None:
     decoder = get_family("text-lines").decoder()
     decoder.feed(0, data)
     assert decoder.refused
-    assert "--option column=Left" in describe_bytes(data, {})
+    assert describe_bytes(data, {}).alternatives == ({"column": "Left"},)
     distances = read(data, column="Left").distance_m
     np.testing.assert_allclose(distances, np.array(DISTANCES_CM[-distances.size :]) / 100)
     both = get_family("text-lines").decoder()
@@ -82,7 +83,7 @@ def test_numbers_that_must_be_metres_are_asked_about() -> None:
     decoder = get_family("text-lines").decoder()
     decoder.feed(0, data)
     assert decoder.refused
-    assert "--option unit=m" in describe_bytes(data, {})
+    assert describe_bytes(data, {}).alternatives == ({"unit": "m"},)
     assert read(data, unit="m").distance_m.max() == pytest.approx(0.32)
     usual = get_family("text-lines").decoder()
     usual.feed(0, lines("{d:.2f}\r\n"))
@@ -116,5 +117,5 @@ def test_frames_whose_sum_leaves_the_header_out_are_read(first: int) -> None:
 )
 def test_what_is_not_read_is_named(data: bytes, words: str) -> None:
     """The likeliest cause is said, and noise only of bytes that repeat nothing and are no text."""
-    assert words in describe_bytes(data, {})
+    assert words in described(describe_bytes(data, {}))
     assert probe(data) == []
