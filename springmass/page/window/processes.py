@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import csv
 import json
 import os
 import sys
@@ -88,12 +87,12 @@ async def resident_bytes(pid: int) -> int:
             return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
         return 0
     windows = os.name == "nt"
-    of_windows = ("tasklist", "/fo", "csv", "/nh", "/fi", f"pid eq {pid}")
+    of_windows = ("tasklist", "/nh", "/fi", f"pid eq {pid}")
     command = of_windows if windows else ("ps", "-o", "rss=", "-p", f"{pid}")
     process = await asyncio.create_subprocess_exec(*command, stdout=PIPE, stderr=DEVNULL)
     text = (await process.communicate())[0].decode(errors="replace")
-    cell = next(csv.reader([text]), [""])[-1]  # of tasklist "12,345 K", with the marks of any language
-    return int("".join(filter(str.isdigit, cell)) or 0) * 1024
+    numbers = [word for word in text.strip().removesuffix(" K").split(" ") if word]  # of Windows "... 1   12.345 K"
+    return int("".join(filter(str.isdigit, numbers[-1] if numbers else "")) or 0) * 1024
 
 
 class Children:
