@@ -15,10 +15,10 @@ RECORDS = min(clean.RECORDS, int(os.environ.get("SPRINGMASS_TRIALS", "48")))
 
 # Kinds and files with values that are called sound and are wrong today. One that is mended is to be taken out.
 WRONG_KINDS = {
-    "strong-pendulum", "moving-rest", "turning-plane", "ellipse", "close-modes", "slack-string", "leaking-mass",
-    "frame-rate", "pendulum-position", "pendulum-gyro", "cantilever-overtone",
+    "strong-pendulum", "moving-rest", "turning-plane", "ellipse", "slack-string", "leaking-mass",
+    "frame-rate", "pendulum-position", "pendulum-gyro",
 }  # fmt: skip
-WRONG_FILES = WRONG_KINDS - {"cantilever-overtone", "close-modes", "turning-plane"} | {"strong-creep"}
+WRONG_FILES = WRONG_KINDS - {"turning-plane"} | {"strong-creep"}
 
 pytestmark = pytest.mark.trials
 
