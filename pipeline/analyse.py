@@ -9,13 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from pipeline.analysis import Analysis
 from pipeline.bench.scene import Scene
 from pipeline.checks.echoes import echoes_by_chance, find_clusters
+from pipeline.checks.halves import compare_halves
 from pipeline.checks.judge import judge
+from pipeline.checks.residual import Misfit
 from pipeline.findings.finding import worded
 from pipeline.findings.motion import (
     apart_finding,
@@ -38,7 +41,7 @@ from pipeline.notice import Notice
 from pipeline.numerics.levels import ROUNDS
 from pipeline.numerics.threads import one_thread
 from pipeline.options import Options
-from pipeline.parts.part import find_part
+from pipeline.parts.part import Part, find_part
 from pipeline.results.derive import derive
 from pipeline.results.effects import tabulate
 from pipeline.samples.condition import Samples, condition
@@ -47,7 +50,18 @@ from pipeline.track import F8, Track
 __all__ = ["Analysis", "Oscillation", "Relaxation", "Rest", "TwoModes", "analyse"]
 
 
-@one_thread
+class Measured(NamedTuple):
+    """What follows from the samples: the motion in a part of them, and what is noticed about the two."""
+
+    part: Part
+    samples: Samples
+    motion: Motion
+    apart: tuple[Apart, ...]
+    notices: tuple[Notice, ...]
+    misfits: tuple[Misfit, ...]
+    options: Options
+
+
 def analyse(track: Track, scene: Scene | None = None, options: Options | None = None) -> Analysis:
     """Turn a track into estimates, laws, effects and findings.
 
@@ -61,7 +75,19 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
     >>> print(analyse(Track.from_arrays(t, y)).estimates["period"])  # 2 pi / 8.3 = 0.757010
     0.757010 +- 0.000022 s
     """
-    scene, options = scene or Scene(), options or Options()
+    scene = scene or Scene()
+    return conclude(measure(track, scene, options or Options()), scene)
+
+
+def of_samples(scene: Scene) -> tuple[object, ...]:
+    """Return what :func:`measure` uses of a scene: the stated law, the sensor, and whether there is a spring."""
+    sensor = (value for name, value in vars(scene).items() if name.startswith("sensor_"))
+    return scene.damping_law, scene.hangs_on_spring, *sensor
+
+
+@one_thread
+def measure(track: Track, scene: Scene, options: Options) -> Measured:
+    """Fit the motion to the samples; what it needs of the scene is :func:`of_samples`."""
     if options.stated is None and scene.damping_law is not None:
         options = replace(options, stated=scene.damping_law)
     if (ppm := scene.sensor_clock_ppm) is not None:
@@ -79,8 +105,15 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
         motion = with_law_of_pendulum(motion, scene.pendulum_length_m, samples.track.unit)
     if apart:
         samples, motion = _with_lines(samples, motion, np.sum([line.wave for line in apart], axis=0))
-    track = samples.track
+    motion, differ = compare_halves(motion)
     notices, misfits = judge(samples, motion, scene, part.lost)
+    return Measured(part, samples, motion, tuple(apart), (*differ, *notices), misfits, options)
+
+
+def conclude(measured: Measured, scene: Scene) -> Analysis:
+    """Derive the results on a bench: the estimates, the effects and the findings."""
+    part, samples, motion, apart, notices, misfits, options = measured
+    track = samples.track
     effects = tabulate(track, motion, scene) if isinstance(motion, Oscillation) else ()
     derived = derive(track, motion, scene, effects, misfits)
     constant = "spring_constant" in derived.estimates

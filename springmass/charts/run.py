@@ -14,7 +14,7 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import scatter
 from pipeline.results.classic import CYCLES, Classic
 from pipeline.results.curves import Curve, Smoothed
-from pipeline.track import F8, UNUSABLE, Quality
+from pipeline.track import F8, UNUSABLE, Quality, Track
 from pipeline.units import RECORDED_UNITS, noun
 from springmass.charts.chart import Chart, ChartNote, Panel, Role, Series, band_of, line_of, rate_label, value_label
 from springmass.typeset import law_status, pretty
@@ -78,6 +78,13 @@ def position(a: Analysis, notes: Sequence[ChartNote] = ()) -> Chart:
     end = float(t[used][0]) + DETAIL_PERIODS / cycles.frequency_hz if long else None
     caption = f"Samples and fit; below, residuals divided by the noise of one sample, σ = {sigma}."
     return Chart("position", "Position and residuals", caption, tuple(panels), end)
+
+
+def recording(track: Track) -> Chart:
+    """The samples alone, before anything is known of their motion."""
+    what = "position" if track.unit == "m" else noun(track.unit)
+    samples = line_of("samples", track.t, track.y * RECORDED_UNITS[track.unit].factor, "data")
+    return Chart("recording", "Recording", "", (Panel(value_label(what, track.unit), (samples,), 1.3),))
 
 
 def used_samples(a: Analysis) -> NDArray[np.bool_]:
