@@ -16,6 +16,7 @@ import numpy as np
 from pipeline.analysis import Analysis
 from pipeline.bench.scene import Scene
 from pipeline.checks.echoes import echoes_by_chance, find_clusters
+from pipeline.checks.halves import compare_halves
 from pipeline.checks.judge import judge
 from pipeline.checks.residual import Misfit
 from pipeline.findings.finding import worded
@@ -101,8 +102,9 @@ def measure(track: Track, scene: Scene, options: Options) -> Measured:
     motion, samples = fit_motion(part, options), part.samples
     if apart:
         samples, motion = _with_lines(samples, motion, np.sum([line.wave for line in apart], axis=0))
+    motion, differ = compare_halves(motion)
     notices, misfits = judge(samples, motion, scene, part.lost)
-    return Measured(part, samples, motion, tuple(apart), notices, misfits, options)
+    return Measured(part, samples, motion, tuple(apart), (*differ, *notices), misfits, options)
 
 
 def conclude(measured: Measured, scene: Scene) -> Analysis:
