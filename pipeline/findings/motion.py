@@ -15,12 +15,13 @@ from pipeline.motion.at_rest import Rest
 from pipeline.motion.by_samples import FEW_WINDOWS
 from pipeline.motion.fitted import Oscillation, RestPosition
 from pipeline.motion.kinds import Motion
-from pipeline.motion.lines import Steady
+from pipeline.motion.lines import Apart, find_several
 from pipeline.motion.relaxation import Relaxation
 from pipeline.motion.two_modes import TwoModes
 from pipeline.notice import Notice
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.levels import NOTICEABLE, VERY_STRONG
+from pipeline.samples.condition import Samples
 from pipeline.units import amount, number
 from pipeline.windows.demodulate import model_error
 
@@ -39,11 +40,21 @@ def kind_findings(motion: Motion, estimates: Mapping[str, Estimate]) -> Iterator
         yield Notice("no_oscillation", {"why": motion.why})
 
 
-def steady_findings(steady: Steady | None) -> Iterator[Notice]:
-    """Yield the steady oscillation that was subtracted before the fit."""
-    if steady is not None:
-        cause = "mains hum" if steady.mains else "a drive"
-        yield Notice("driven", {"amplitude_m": steady.amplitude, "frequency_hz": steady.frequency_hz, "cause": cause})
+def apart_finding(line: Apart) -> Notice:
+    """Return what a line is that was subtracted before the fit."""
+    numbers = {"amplitude_m": line.amplitude, "frequency_hz": line.frequency_hz}
+    if line.cause == "overtone":
+        return Notice("overtone", numbers)
+    return Notice("driven", {**numbers, "cause": "mains hum" if line.cause == "mains" else "a drive"})
+
+
+def several_findings(samples: Samples, motion: Oscillation, notices: tuple[Notice, ...]) -> Iterator[Notice]:
+    """Yield the lines that describe a recording, if one oscillation does not."""
+    if motion.damping.admissible and all(found.code != "model_misfit" for found in notices):
+        return
+    lines = find_several(samples)
+    if lines is not None and lines.are_several() and lines.leaves_noise(samples):
+        yield Notice("several_lines", {"lines": len(lines.sizes), "listed": lines.listed(samples.track.unit)})
 
 
 def fit_findings(fitted: Oscillation) -> Iterator[Notice]:

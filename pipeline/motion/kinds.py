@@ -12,7 +12,7 @@ from pipeline.motion.averaged import check_coherence, fit_windows, typical_miss
 from pipeline.motion.by_samples import FEW_WINDOWS, fit_samples
 from pipeline.motion.equation import fit_equation
 from pipeline.motion.fitted import Oscillation
-from pipeline.motion.lines import WEAKER
+from pipeline.motion.lines import WEAKER, find_several
 from pipeline.motion.relaxation import LEAST_DAMPING, Relaxation, find_relaxation
 from pipeline.motion.two_modes import TwoModes, find_two_modes
 from pipeline.options import Options
@@ -49,7 +49,11 @@ def fit_motion(part: Part, options: Options) -> Motion:
     incoherent = check_coherence(fitted, missed)
     if (incoherent or missed > WEAKER) and (two := find_two_modes(samples)) is not None:
         return two
-    return fitted if incoherent is None else rest_of(samples, incoherent.why)
+    if incoherent is None:
+        return fitted
+    lines = find_several(samples)
+    listed = "" if lines is None else f"; the strongest lines are {lines.listed(samples.track.unit)}"
+    return rest_of(samples, f"{incoherent.why}{listed}")
 
 
 def _without_cycles(samples: Samples, why: NoOscillation) -> Relaxation | TwoModes | Rest:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.motion.lines import WEAKER, find_lines
+from pipeline.motion.lines import WEAKER, Scaled
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.levels import NEGLIGIBLE
 from pipeline.samples.condition import Samples
@@ -59,27 +59,30 @@ def find_two_modes(samples: Samples) -> TwoModes | None:
     from the strongest line of the spectrum and the strongest line of the residual of the first. Covariances are scaled
     by the residuals, including their correlation.
     """
-    lines = find_lines(samples, 2, apart=0.0, fewest=2)
+    if (record := Scaled.of(samples)) is None:
+        return None
+    first = record.strongest(record.values)
+    second = record.strongest(record.less(record.linear((first, 0.0))))
+    lines = record.fitted(record.linear((first, 0.0), (second, 0.0)))
     if lines is None or not lines.left < NEGLIGIBLE:
         return None
-    places = sorted((1, 5), key=lambda i: -float(np.hypot(*lines.values[i : i + 2])))
-    omegas = [abs(float(lines.values[i + 2])) for i in places]
-    sizes = [float(np.hypot(*lines.values[i : i + 2])) for i in places]
-    beats = abs(omegas[0] - omegas[1]) * lines.seconds / (2.0 * math.pi)
-    if min(omegas) * lines.seconds < 2.0 * math.pi * PERIODS or beats < BEATS or sizes[1] < WEAKER * sizes[0]:
+    strong, weak = np.argsort(-lines.sizes).tolist()
+    omegas, sizes = lines.omegas, lines.sizes
+    beats = abs(omegas[0] - omegas[1]) * record.seconds / (2.0 * math.pi)
+    slow, fast = float(np.min(omegas)), float(np.max(omegas))
+    if slow * record.seconds < 2.0 * math.pi * PERIODS or beats < BEATS or sizes[weak] < WEAKER * sizes[strong]:
         return None
-    slow, fast = sorted(omegas)
     # A component at a multiple of the slower frequency is not a second mode but a harmonic, as of a square wave.
-    if round(fast / slow) > 1 and abs(fast - round(fast / slow) * slow) * lines.seconds < math.pi:
+    if round(fast / slow) > 1 and abs(fast - round(fast / slow) * slow) * record.seconds < math.pi:
         return None
-    order = [0, *(k for i in places for k in range(i, i + 4))]
+    order = [0, *(k for i in (strong, weak) for k in range(1 + 4 * i, 5 + 4 * i))]
     # Back to the unit of the record; the rest position was measured from the mean.
-    scale, unit = lines.scale, samples.track.unit
+    scale, unit = record.scale, samples.track.unit
     turn = np.array([scale, *(2 * (scale, scale, 1.0, 1.0))])
-    level = np.array([lines.level, *(8 * (0.0,))])
+    level = np.array([record.level, *(8 * (0.0,))])
     units = (unit, *(2 * (unit, unit, "rad/s", "1/s")))
     covariance = lines.covariance[np.ix_(order, order)] * np.outer(turn, turn)
     joint = Joint(MODE_PARAMETERS, lines.values[order] * turn + level, covariance, units)
     residual = np.full(len(samples.track), np.nan)
-    residual[lines.used] = scale * lines.residual
-    return TwoModes(joint, lines.dof, samples.noise_estimate, lines.start_s, residual, samples.flags)
+    residual[record.used] = scale * lines.residual
+    return TwoModes(joint, lines.dof, samples.noise_estimate, record.start_s, residual, samples.flags)

@@ -14,8 +14,8 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import scatter
 from pipeline.results.classic import CYCLES, Classic
 from pipeline.results.curves import Curve, Smoothed
-from pipeline.track import F8, UNUSABLE, Quality
-from pipeline.units import DISPLAY_UNITS, noun
+from pipeline.track import F8, UNUSABLE, Quality, Track
+from pipeline.units import RECORDED_UNITS, noun
 from springmass.charts.chart import Chart, ChartNote, Panel, Role, Series, band_of, line_of, rate_label, value_label
 from springmass.typeset import law_status, pretty
 
@@ -42,7 +42,7 @@ MOST_SLIDING = 2000  # amplitudes of the classic method, which overlap
 
 def position(a: Analysis, notes: Sequence[ChartNote] = ()) -> Chart:
     """Samples with their fit, residuals over the noise of one sample, and the rest position if it moves."""
-    track, factor = a.track, DISPLAY_UNITS[a.track.unit].factor
+    track, factor = a.track, RECORDED_UNITS[a.track.unit].factor
     rows = np.flatnonzero(np.isfinite(track.t))
     rows = rows[np.argsort(track.t[rows], kind="stable")]
     t, y, used = track.t[rows], track.y[rows] * factor, used_samples(a)[rows]
@@ -58,7 +58,7 @@ def position(a: Analysis, notes: Sequence[ChartNote] = ()) -> Chart:
     flagged = [Series(f"left out ({out.size})", t[out], places, "flagged", why=why)] if out.size else []
     series = [samples, *flagged, *_marks(notes)]
     noise, motion = a.estimates["noise"], a.motion
-    sigma = pretty(Estimate(factor * noise.value, factor * noise.u, DISPLAY_UNITS[track.unit].unit))
+    sigma = pretty(Estimate(factor * noise.value, factor * noise.u, RECORDED_UNITS[track.unit].unit))
     if isinstance(motion, Relaxation):
         grid, curve = _relaxing(a, motion)
         series.insert(0, line_of("fit", grid, curve * factor))
@@ -78,6 +78,13 @@ def position(a: Analysis, notes: Sequence[ChartNote] = ()) -> Chart:
     end = float(t[used][0]) + DETAIL_PERIODS / cycles.frequency_hz if long else None
     caption = f"Samples and fit; below, residuals divided by the noise of one sample, σ = {sigma}."
     return Chart("position", "Position and residuals", caption, tuple(panels), end)
+
+
+def recording(track: Track) -> Chart:
+    """The samples alone, before anything is known of their motion."""
+    what = "position" if track.unit == "m" else noun(track.unit)
+    samples = line_of("samples", track.t, track.y * RECORDED_UNITS[track.unit].factor, "data")
+    return Chart("recording", "Recording", "", (Panel(value_label(what, track.unit), (samples,), 1.3),))
 
 
 def used_samples(a: Analysis) -> NDArray[np.bool_]:
@@ -142,7 +149,7 @@ def amplitude(a: Analysis, laws: Sequence[str] | None = None) -> Chart | None:
     """Amplitudes of the windows with the damping laws, and the selected law's residuals over u."""
     if (motion := a.oscillation) is None:
         return None
-    damping, windows, factor = motion.damping, motion.windows, DISPLAY_UNITS[a.track.unit].factor
+    damping, windows, factor = motion.damping, motion.windows, RECORDED_UNITS[a.track.unit].factor
     t, y, u, kept = windows.t, windows.amplitude * factor, damping.scatter.u * factor, damping.scatter.kept
     curves = _law_lines(a, laws)
     points = Series("amplitude of one window", t[kept], y[kept], u=u[kept])
@@ -172,7 +179,7 @@ def _law_lines(a: Analysis, laws: Sequence[str] | None) -> list[Series]:
         words = "exponential, linear drag" if name == EXPONENTIAL else name
         together = name in unnamed and len(unnamed) > 1
         label = f"{len(unnamed)} other laws" if together else f"{words} ({law_status(damping, name)})"
-        curve = damping.fits[name].amplitude(grid - damping.t0) * DISPLAY_UNITS[a.track.unit].factor
+        curve = damping.fits[name].amplitude(grid - damping.t0) * RECORDED_UNITS[a.track.unit].factor
         role: Role = "law" if name == damping.selected else "rest" if name in unnamed else "other"
         lines.append(line_of(label, grid, curve, role))
     return lines
@@ -199,7 +206,7 @@ def frequency(a: Analysis) -> Chart | None:
         (slope, _), covariance = np.polyfit(t - t.mean(), turned, 1, w=np.sqrt(weight), cov="unscaled")
         points.append((float(np.mean(windows.amplitude[part])), slope, covariance[0, 0] ** 0.5))
     size, slope, u = np.array(sorted(points), np.float64).T
-    factor, mean = DISPLAY_UNITS[a.track.unit].factor, phase.angular_frequency.value
+    factor, mean = RECORDED_UNITS[a.track.unit].factor, phase.angular_frequency.value
     grid = np.linspace(float(size[0]), float(size[-1]), 100)
     shift = 1e3 / (2.0 * np.pi)
     changes = phase.backbone is not None
@@ -218,7 +225,7 @@ def spectrum(a: Analysis) -> Chart | None:
     if (motion := a.oscillation) is None or (spectra := spectrum_of(a, motion)) is None:
         return None
     f, whole, left = spectra
-    factor, best = DISPLAY_UNITS[a.track.unit].factor, peaks_of(whole)
+    factor, best = RECORDED_UNITS[a.track.unit].factor, peaks_of(whole)
     floor = float(np.median(left[left > 0])) if (left > 0).any() else float(whole.max()) * 1e-6
     lines = (
         line_of("residuals of the fit", f, left * factor, "other"),
@@ -241,7 +248,7 @@ def drag(a: Analysis) -> Chart | None:
     both = ((curve.y, curve.u), (curve.y_points, curve.u_points))
     ends = np.clip(np.concatenate([y + sign * u for y, u in both for sign in (-1, 1)]), -most, most)
     low, high = min(0.0, float(np.min(ends))), float(np.max(ends))
-    series = _with_band(curve, DISPLAY_UNITS[unit].factor, 1.0, "a stretch of the run", f"law {a.damping.selected}")
+    series = _with_band(curve, RECORDED_UNITS[unit].factor, 1.0, "a stretch of the run", f"law {a.damping.selected}")
     shown = (low, high + 0.08 * (high - low))
     panel = Panel("effective drag coefficient", series, 3.0, value_label("amplitude", unit), range=shown)
     caption = (
@@ -291,7 +298,7 @@ def motion(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
     rows = rows[:: max(1, round(a.track.rate_hz / fit.windows.cycles.frequency_hz / PER_PERIOD))]
     t, velocity, u = smoothed.t[rows], smoothed.velocity[rows], smoothed.u_velocity[rows]
     names = ("velocity", "acceleration") if unit == "m" else ("derivative", "2nd derivative")
-    k = DISPLAY_UNITS[unit].factor
+    k = RECORDED_UNITS[unit].factor
     off = k * (velocity - model_motion(fit, t)[1])
     band = rows.size // 400 + 1  # u changes slowly
     first = [line_of(names[0], t, velocity)]
@@ -317,7 +324,7 @@ def phase(a: Analysis) -> Chart | None:
     if (motion := a.oscillation) is None:
         return None
     track, unit = a.track, a.track.unit
-    factor, period = DISPLAY_UNITS[unit].factor, 2.0 * np.pi / motion.phase.angular_frequency.value
+    factor, period = RECORDED_UNITS[unit].factor, 2.0 * np.pi / motion.phase.angular_frequency.value
     inside = (a.flags & Quality.OUTSIDE) == 0
     first, end = motion.damping.t0, float(np.nanmax(track.t[inside]))
     turns = max(int((end - first) / period), 1)
@@ -343,7 +350,7 @@ def classic_method(a: Analysis, classic: Classic) -> Chart | None:
     """The lab report's choices over this analysis: two maxima, two extremes, sliding windows and their exponential."""
     if (ours := amplitude(a, [a.damping.selected])) is None:
         return None
-    factor, period = DISPLAY_UNITS[a.track.unit].factor, classic.estimates["period"].value
+    factor, period = RECORDED_UNITS[a.track.unit].factor, classic.estimates["period"].value
     start, end = (float(classic.crests_t[i]) + s * 0.75 * period for i, s in ((0, -1), (-1, 1)))
     near = np.flatnonzero(used_samples(a) & (a.track.t >= start) & (a.track.t <= end))
     if not near.size:

@@ -12,7 +12,7 @@ from pipeline.bench.disc import STEADY_DISC_DRAG, disc_drag_coefficient
 from pipeline.several.compare import Comparison
 from pipeline.several.masses import Hooke, MassLine
 from pipeline.track import F8
-from pipeline.units import DISPLAY_UNITS, noun
+from pipeline.units import RECORDED_UNITS, noun
 from springmass.charts.chart import Chart, Panel, Series, band_of, line_of, value_label
 from springmass.charts.run import DETAIL_PERIODS, used_samples
 from springmass.typeset import prefixed, pretty
@@ -32,7 +32,7 @@ def overlay(names: Sequence[str], analyses: Sequence[Analysis]) -> Chart | None:
         rest = np.full(t.size, np.mean(y))
         if motion is not None:
             rest, fastest = motion.rest.at(t), max(fastest, motion.windows.cycles.frequency_hz)
-        series.append(line_of(visible(name), t - t[0], (y - rest) * DISPLAY_UNITS[unit].factor, "other"))
+        series.append(line_of(visible(name), t - t[0], (y - rest) * RECORDED_UNITS[unit].factor, "other"))
     what = "displacement" if unit == "m" else f"{noun(unit)} from rest"
     panel = Panel(value_label(what, unit), tuple(series), x_label="time since the first sample used / s")
     caption = "Displacement of every run from its rest position."

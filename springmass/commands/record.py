@@ -24,7 +24,7 @@ from acquisition.simulated import VirtualPort, VirtualRangefinder, VirtualSensor
 from pipeline.bench.air import speed_of_sound
 from pipeline.bench.disc import scene_air
 from pipeline.bench.scene import Scene
-from pipeline.numerics.estimate import format_value
+from pipeline.numerics.estimate import Estimate
 from springmass.commands.given import GivenOptions
 from springmass.commands.options import DecoderOptions, FileArgument, PageOptions
 from springmass.commands.parameters import (
@@ -361,8 +361,9 @@ class _Bench:
             points.append(self._still(seconds, "keep it still"))
         self.session.calibrate(points, ruler, U_RULER_M)
         calibration = self.session.sensors[0].calibration
-        scale = format_value(calibration.scale, calibration.u_scale)
-        self.console.line(f"scale {scale}, offset {format_value(calibration.offset_m, calibration.u_offset_m, 'm')}")
+        scale = Estimate(calibration.scale, calibration.u_scale)
+        offset = Estimate(calibration.offset_m, calibration.u_offset_m, "m")
+        self.console.line(f"scale {scale}, offset {offset}")
         self._ask("hang the bob over the sensor, then press Enter")
         return self._still(seconds, "let it hang still")
 

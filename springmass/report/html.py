@@ -7,6 +7,7 @@ import functools
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from acquisition.errors import visible
@@ -92,7 +93,7 @@ def render_html(
     return template("report.html.j2").render(
         title=", ".join(run.name for run in runs),
         parts=parts,
-        tables=list(_tables(runs)),
+        tables=list(tables_of(runs)),
         several=overview,
         compared=compared,
         of_reported={code for code, kind in kinds().items() if "reported" in kind.about},
@@ -124,6 +125,11 @@ def script_sha256() -> str:
     return base64.b64encode(hashlib.sha256(report_script().encode()).digest()).decode()
 
 
+def page_style() -> str:
+    """Return the style that all reports share, and the window."""
+    return Path(__file__).with_name("templates").joinpath("page.css").read_text("utf-8")
+
+
 @functools.cache
 def template(name: str) -> Template:
     """Return a page's template, cached because compiling the report's takes as long as an analysis of ten seconds."""
@@ -150,7 +156,7 @@ def template(name: str) -> Template:
     return environment.get_template(name)
 
 
-def _tables(runs: Sequence[Run]) -> Iterator[dict[str, Any]]:
+def tables_of(runs: Sequence[Run]) -> Iterator[dict[str, Any]]:
     """Yield Table 1 in blocks of as many runs as fit side by side on paper."""
     for first in range(0, len(runs), BESIDE):
         some = runs[first : first + BESIDE]

@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.block import Flag
+from acquisition.block import UNITS, Flag
 from acquisition.recordings.identify import open_recording
 from acquisition.recordings.reading import ReadOptions
 from pipeline.analyse import Analysis, analyse
-from pipeline.track import UNITS, Track
+from pipeline.track import Track
 from tests.sampling import sampled
 from tests.synthetic import Truth, noisy, times
 
@@ -50,7 +50,7 @@ def records() -> dict[str, np.ndarray]:
 
 def track(y: np.ndarray, factor: float, quantity: str = "length") -> Track:
     """Return a record whose values are multiplied by a factor."""
-    return Track.from_arrays(T, y * factor, quantity=quantity, unit=UNITS[quantity])
+    return Track.from_arrays(T, y * factor, unit=UNITS[quantity])
 
 
 def same(found: Analysis, expected: Analysis, factor: float) -> None:

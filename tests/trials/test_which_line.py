@@ -13,7 +13,7 @@ from pipeline.track import Track
 from tests.trials.grades import kinds
 
 TRIALS = int(os.environ.get("SPRINGMASS_TRIALS", "24"))
-NAMED = {"half_frequency", "driven", "random_excitation"}
+NAMED = {"half_frequency", "driven", "overtone", "several_lines", "random_excitation"}
 
 pytestmark = pytest.mark.trials
 

@@ -104,7 +104,7 @@ def test_a_wide_pendulum(quadratic: float, degrees: int) -> None:
     angle += math.radians(0.1) * np.random.default_rng(degrees).standard_normal(t.size)
     step = math.radians(0.25)
     scene = Scene(pendulum_length_m=(9.81 / square, 1e-6))
-    analysis = analyse(Track.from_arrays(t, step * np.round(angle / step), unit="rad", quantity="angle"), scene)
+    analysis = analyse(Track.from_arrays(t, step * np.round(angle / step), unit="rad"), scene)
     assert not codes(analysis) & {"touched", "phase_jump", "restarted", "handled"}
     assert degrees > 75 or "rest_drift" not in codes(analysis)
     amplitude, small = analysis.estimates["amplitude"], analysis.estimates["period_small_swings"]
@@ -124,7 +124,7 @@ def test_the_amplitude_of_a_small_pendulum_is_corrected_for(degrees: int) -> Non
     t, start = np.arange(1000) / 50, math.radians(degrees)
     period = 4.0 * math.sqrt(1.0 / 9.81) * float(ellipk(math.sin(0.5 * start) ** 2))
     angle = start * np.cos(2.0 * math.pi * t / period) + 1e-4 * np.random.default_rng(degrees).standard_normal(t.size)
-    analysis = analyse(Track.from_arrays(t, angle, unit="rad", quantity="angle"), Scene(pendulum_length_m=(1.0, 1e-6)))
+    analysis = analyse(Track.from_arrays(t, angle, unit="rad"), Scene(pendulum_length_m=(1.0, 1e-6)))
     gravity = analysis.estimates["gravity"]
     assert abs(gravity.value - 9.81) < 3.0 * gravity.u
     assert gravity.u < 2e-3

@@ -22,13 +22,32 @@ def test_what_falls_is_analysed_beside_a_steady_line(kind: str) -> None:
     assert "driven" in said.warnings
 
 
+def test_an_overtone_does_not_disturb_the_lowest_oscillation() -> None:
+    """It is named and subtracted, also if it is as large at first and far above the other."""
+    record = kinds.trouble("cantilever-overtone", 0)
+    said = record.said()
+    assert max(map(abs, said.errors(record.truth).values())) < 4.0
+    assert said.warnings == {"overtone"}
+
+
+@pytest.mark.parametrize(("kind", "count"), [("three-modes", 3), ("close-modes", 2)])
+def test_oscillations_that_overlap_are_listed(kind: str, count: int) -> None:
+    """Frequencies and sizes are listed where one oscillation does not describe the record, and no period is sound."""
+    for seed in range(3):
+        record = kinds.trouble(kind, seed)
+        findings = {each.code: each for each in analyse(Track.from_arrays(record.t, record.y)).findings}
+        found = findings.get("several_lines") or findings["no_oscillation"]
+        assert found.message.count(" Hz") == count
+        assert not any(value.sound for name, value in record.said().values.items() if name.startswith("period"))
+
+
 @pytest.mark.parametrize("kind", ["magnitude", "radial-acceleration", "magnet-pendulum"])
 def test_two_cycles_in_each_of_the_motion_are_named(kind: str) -> None:
     """No value is sound, and the period of the motion is offered."""
     record = kinds.trouble(kind, 1)
     said = record.said()
     assert not any(value.sound for value in said.values.values())
-    analysis = analyse(Track.from_arrays(record.t, record.y, unit=record.unit, quantity=kinds.QUANTITIES[record.unit]))
+    analysis = analyse(Track.from_arrays(record.t, record.y, unit=record.unit))
     offered = next(finding.values["motion_s"] for finding in analysis.findings if finding.code == "half_frequency")
     period = record.truth["period"]
     low, high = period if isinstance(period, tuple) else (period, period)
