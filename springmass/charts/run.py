@@ -253,7 +253,8 @@ def drag(a: Analysis) -> Chart | None:
     panel = Panel("effective drag coefficient", series, 3.0, value_label("amplitude", unit), range=shown)
     caption = (
         "−dA/dt · 3π M/(2 ω ρ S A²), M the mass that swings: the coefficient of purely quadratic drag on the disc with "
-        "the same energy loss, that of the spring included. Where it depends on the amplitude, a constant does not describe the drag."
+        "the same energy loss, that of the spring included. Where it depends on the amplitude, a constant does not "
+        "describe the drag."
     )
     return Chart("drag", "Effective drag coefficient", caption, (panel,))
 
