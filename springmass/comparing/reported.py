@@ -190,12 +190,13 @@ def _echoes(row: Reported, run: Run, ours: Estimate) -> dict[str, float | str] |
     ratio = row.value / ours.value
     if ratio < ECHOES or _agrees(run, row, ours):
         return None
-    recorded = velocity is not None and bool(np.isfinite(velocity).any())
-    if recorded:
+    include = "perhaps include"
+    if velocity is not None and np.isfinite(velocity).any():
+        include = "include"
         whole = float(np.sqrt(np.nanmean(np.square(velocity)))) / run["velocity_rms"].value
         if abs(ratio - whole) > 0.25 * (whole - 1.0):
             return None
-    return {"echoes": echoes, "ratio": ratio, "include": "include" if recorded else "perhaps include"}
+    return {"echoes": echoes, "ratio": ratio, "include": include}
 
 
 def _uncertainty(row: Reported, scale: float, run: Run, rows: Sequence[Reported]) -> Notice | None:
