@@ -34,6 +34,7 @@ from pipeline.motion.at_rest import Rest
 from pipeline.motion.fitted import Oscillation
 from pipeline.motion.kinds import Motion, fit_motion
 from pipeline.motion.lines import Apart, find_apart
+from pipeline.motion.pendulum import with_law_of_pendulum
 from pipeline.motion.relaxation import Relaxation
 from pipeline.motion.two_modes import TwoModes
 from pipeline.notice import Notice
@@ -100,6 +101,8 @@ def measure(track: Track, scene: Scene, options: Options) -> Measured:
         samples = condition(samples.less(line.wave).track)
     part = find_part(samples)
     motion, samples = fit_motion(part, options), part.samples
+    if isinstance(motion, Oscillation) and scene.pendulum_length_m is not None:
+        motion = with_law_of_pendulum(motion, scene.pendulum_length_m, samples.track.unit)
     if apart:
         samples, motion = _with_lines(samples, motion, np.sum([line.wave for line in apart], axis=0))
     motion, differ = compare_halves(motion)
