@@ -131,7 +131,7 @@ FORMULAS: Mapping[str, ResultFormula] = {
     ),
     "drag_coefficient": ResultFormula(
         lambda drag_per_beta, coefficients: drag_per_beta * coefficients["beta"][0],
-        "C = 3π m β/(2 ω ρ S), S = π D²/4, if β belongs to the only admissible law",
+        "C = 3π M β/(2 ω ρ S) with M the mass that swings, S = π D²/4, if β belongs to the only admissible law",
         "beta_settled",
     ),
     # What other results, the curves and comparisons need.
