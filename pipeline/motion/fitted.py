@@ -36,7 +36,8 @@ class Phase:
     middle: float  # weighted mean time, s
     area: TimeTable | None = None  # integral of A^2 from the middle; with a backbone
     lag: TimeTable | None = None  # delay of a period's sinusoid, rad; None if it is constant
-    small_swings: Estimate | None = None  # angular frequency of very small swings; with a backbone
+    small_swings: Estimate | None = None  # angular frequency of very small swings; with a backbone or of a pendulum
+    of_pendulum: bool = False  # whether these follow from the law of a pendulum
     spread: Scatter | None = None  # of the windows' phases about a smooth curve; None of a single window
     squared_rate: float | None = None  # decrease of the squared frequency by drag, 1/s^2; None: that of the windows
 

@@ -252,6 +252,7 @@ def _of_motion(
         "order": {"m": 0, "rad": 0, "m/s": 1, "rad/s": 1, "m/s^2": 2}.get(unit),
         "of_length": unit in _LENGTHS or None,
         "of_angle": unit in ("rad", "rad/s") or None,
+        "of_pendulum": phase.of_pendulum or unit in ("rad", "rad/s") or None,
     }
 
 
@@ -287,8 +288,8 @@ def _small_swings(phase: Phase, laws: _Laws, windows: Windows) -> Estimate | Non
     to the value extrapolated to s = 0 is about :math:`s_1 s_2/4`, with the shares of the first and the median swing.
     """
     small = phase.small_swings
-    if small is None or phase.backbone is None:
-        return None
+    if small is None or phase.backbone is None or phase.of_pendulum:
+        return small
     squares = float(laws.values[0]) ** 2 * float(np.median(windows.amplitude**2))
     next_term = 0.25 * (phase.backbone.value / small.value) ** 2 * squares * small.value
     return Estimate(small.value, math.hypot(small.u, next_term), small.unit)
