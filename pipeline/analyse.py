@@ -16,6 +16,7 @@ import numpy as np
 from pipeline.analysis import Analysis
 from pipeline.bench.scene import Scene
 from pipeline.checks.echoes import echoes_by_chance, find_clusters
+from pipeline.checks.halves import compare_halves
 from pipeline.checks.judge import judge
 from pipeline.checks.residual import Misfit
 from pipeline.findings.finding import worded
@@ -33,6 +34,7 @@ from pipeline.motion.at_rest import Rest
 from pipeline.motion.fitted import Oscillation
 from pipeline.motion.kinds import Motion, fit_motion
 from pipeline.motion.lines import Apart, find_apart
+from pipeline.motion.pendulum import with_law_of_pendulum
 from pipeline.motion.relaxation import Relaxation
 from pipeline.motion.two_modes import TwoModes
 from pipeline.notice import Notice
@@ -78,9 +80,9 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
 
 
 def of_samples(scene: Scene) -> tuple[object, ...]:
-    """Return what :func:`measure` uses of a scene: the stated law, the sensor, and whether there is a spring."""
+    """Return what :func:`measure` uses of a scene: the stated law, the sensor, a pendulum, whether it has a spring."""
     sensor = (value for name, value in vars(scene).items() if name.startswith("sensor_"))
-    return scene.damping_law, scene.hangs_on_spring, *sensor
+    return scene.damping_law, scene.hangs_on_spring, scene.pendulum_length_m, *sensor
 
 
 @one_thread
@@ -101,8 +103,11 @@ def measure(track: Track, scene: Scene, options: Options) -> Measured:
     motion, samples = fit_motion(part, options), part.samples
     if apart:
         samples, motion = _with_lines(samples, motion, np.sum([line.wave for line in apart], axis=0))
+    motion, differ = compare_halves(motion)
+    if isinstance(motion, Oscillation) and scene.pendulum_length_m is not None:
+        motion = with_law_of_pendulum(motion, scene.pendulum_length_m, samples.track.unit)
     notices, misfits = judge(samples, motion, scene, part.lost)
-    return Measured(part, samples, motion, tuple(apart), notices, misfits, options)
+    return Measured(part, samples, motion, tuple(apart), (*differ, *notices), misfits, options)
 
 
 def conclude(measured: Measured, scene: Scene) -> Analysis:

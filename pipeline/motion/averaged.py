@@ -184,6 +184,7 @@ def fit_phase(windows: Windows, damping: Damping, last: float) -> Phase:
         area=area,
         lag=lag,
         small_swings=small,
+        spread=spread,
     )
 
 
@@ -270,7 +271,7 @@ def fit_rest(windows: Windows, unit: str) -> RestPosition:
     widened = max(spread.correlation, correlation_length(left)) * max(1.0, float(left @ left) / max(left.size - 1, 1))
     estimate = Estimate(mean, math.sqrt(widened / float(weight @ weight)), unit)
     curve = np.asarray(polynomial(t), np.float64)
-    return RestPosition(estimate, float(np.ptp(curve)), gain > VERY_STRONG, t, curve)
+    return RestPosition(estimate, float(np.ptp(curve)), gain > VERY_STRONG, t, curve, spread)
 
 
 def check_coherence(fitted: Oscillation, typical: float) -> NoOscillation | None:

@@ -215,7 +215,8 @@ def find_apart(samples: Samples) -> Apart | None:
     the strongest line, is no multiple of it, and at least a tenth of it at the start.
     """
     record = Scaled.of(samples)
-    if record is None:
+    # Over a long gap the interpolated values would be a slow line, and turns cannot be counted.
+    if record is None or float(np.max(np.diff(record.tau))) > NEGLIGIBLE * record.seconds:
         return None
     omega, power = record.spectrum(record.values)
     first = float(omega[np.argmax(power)])
@@ -264,6 +265,8 @@ def _cause(lines: DecayingLines, number: int) -> Literal["drive", "mains", "over
         return "mains" if mains else "drive"
     if number == 0 or omegas[1] < OVERTONE * omegas[0] or sizes[1] < NEGLIGIBLE * sizes[0]:
         return None
+    if omegas[0] * lines.record.seconds < FEWEST_FOR_CURVE * math.tau:
+        return None  # a slow line of few periods may be a rest position that moves
     if rates[1] > omegas[1] / (math.tau * ROUNDS) or rates[1] < -2.0 * u_rates[1]:
         return None
     return "mains" if mains and rates[1] < OUTLIER * u_rates[1] else "overtone"

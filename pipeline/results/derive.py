@@ -158,7 +158,7 @@ def _closed(track: Track, motion: Relaxation | TwoModes | Rest, scene: Scene, in
     instrument, unit = Instrument.of(track), track.unit
     of_scene = _of_scene(track, scene, {"added_mass", "spring_mass"}, inputs)
     rate, scale = inputs.add("clock_rate", instrument.clock_rate, "B"), of_scene["distance_scale"]
-    x = dict(zip(motion.joint.names, inputs.add_joint("fitted_motion", motion.joint, "A", motion.dof), strict=True))
+    x = dict(zip(motion.joint.names, inputs.add_joint("fitted_motion", motion.joint, motion.dof), strict=True))
     known = {
         "time_factor": rate,
         "rest_position": x["rest"],
@@ -252,6 +252,7 @@ def _of_motion(
         "order": {"m": 0, "rad": 0, "m/s": 1, "rad/s": 1, "m/s^2": 2}.get(unit),
         "of_length": unit in _LENGTHS or None,
         "of_angle": unit in ("rad", "rad/s") or None,
+        "of_pendulum": phase.of_pendulum or unit in ("rad", "rad/s") or None,
     }
 
 
@@ -287,8 +288,8 @@ def _small_swings(phase: Phase, laws: _Laws, windows: Windows) -> Estimate | Non
     to the value extrapolated to s = 0 is about :math:`s_1 s_2/4`, with the shares of the first and the median swing.
     """
     small = phase.small_swings
-    if small is None or phase.backbone is None:
-        return None
+    if small is None or phase.backbone is None or phase.of_pendulum:
+        return small
     squares = float(laws.values[0]) ** 2 * float(np.median(windows.amplitude**2))
     next_term = 0.25 * (phase.backbone.value / small.value) ** 2 * squares * small.value
     return Estimate(small.value, math.hypot(small.u, next_term), small.unit)
@@ -318,7 +319,7 @@ def _amiss(misfits: tuple[Misfit, ...], inputs: Inputs) -> Mapping[str, Any]:
             "damping_rate": misfit.damping_rate,
             "clock": misfit.clock,
         }
-        variables = inputs.add_alternatives(misfit.name, {name: size**2 for name, size in sizes.items()}, "B")
+        variables = inputs.add_alternatives(misfit.name, {name: size**2 for name, size in sizes.items()})
         for name, variable in variables.items():
             by_name[name] = by_name[name] + variable
     return by_name
@@ -356,7 +357,7 @@ class _Laws:
         weights = np.array([one.weight for one in self.weighted])
         weights /= weights.sum()
         self.values: F8 = weights @ each
-        self.variables = inputs.add_joint("damping_law", self.stated.joint, "A", self.stated.dof)
+        self.variables = inputs.add_joint("damping_law", self.stated.joint, self.stated.dof)
         departures = [x - value for x, value in zip(self.variables, self.stated.joint.values.tolist(), strict=True)]
         slopes = math.sqrt(weights[0]) * found[0][2]
         quantities = self.values + slopes @ np.array(departures)
@@ -368,7 +369,7 @@ class _Laws:
                 if one.fit is not self.stated:
                     covariance += weight * factor @ factor.T
             joint = Joint(("amplitude", "damping_rate", "displacement"), np.zeros(3), covariance, ("m", "1/s", "m"))
-            quantities = quantities + np.array(inputs.add_joint("choice_of_law", joint, "A"))
+            quantities = quantities + np.array(inputs.add_joint("choice_of_law", joint))
         self.start, self.rate_at_start, self.root_mean_square = quantities.tolist()
         if damping.by_statement or damping.admissible:
             return
@@ -376,7 +377,7 @@ class _Laws:
         local = local_decay(elapsed, windows.amplitude, expected, damping.scatter, best.joint.units[0])
         if local is not None:
             self.values = np.array([*local.values, self.values[2]])
-            self.start, self.rate_at_start = inputs.add_joint("local_decay", local, "A")
+            self.start, self.rate_at_start = inputs.add_joint("local_decay", local)
 
     def coefficients(self, rate: Any, scale: Any, lam: Any, start: Any) -> dict[str, tuple[Any, str]]:
         """Return the coefficients of the law of the results, in true seconds and metres.

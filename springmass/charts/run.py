@@ -252,8 +252,9 @@ def drag(a: Analysis) -> Chart | None:
     shown = (low, high + 0.08 * (high - low))
     panel = Panel("effective drag coefficient", series, 3.0, value_label("amplitude", unit), range=shown)
     caption = (
-        "−dA/dt · 3π m/(2 ω ρ S A²): the coefficient of purely quadratic drag on the disc with the same energy loss, "
-        "that of the spring included. Where it depends on the amplitude, a constant does not describe the drag."
+        "−dA/dt · 3π M/(2 ω ρ S A²), M the mass that swings: the coefficient of purely quadratic drag on the disc with "
+        "the same energy loss, that of the spring included. Where it depends on the amplitude, a constant does not "
+        "describe the drag."
     )
     return Chart("drag", "Effective drag coefficient", caption, (panel,))
 
@@ -284,7 +285,7 @@ def energy(a: Analysis) -> Chart | None:
     below = Panel("deviation / %", (band, points), 1.3, zero=True)
     mass = a.derived.effective_mass_kg
     of = f"the mass that oscillates, {pretty(mass)}" if mass is not None else "one kilogram, as no mass was given"
-    caption = f"Energy m ω² A²/2 of {of}; below, the deviation of single amplitudes from the law."
+    caption = f"Energy M ω² A²/2 of {of}; below, the deviation of single amplitudes from the law."
     return Chart("energy", "Energy", caption, (above, below))
 
 

@@ -11,7 +11,6 @@ import pytest
 
 from pipeline.analyse import Analysis, analyse
 from pipeline.track import Track
-from tests.motion import motion_of
 from tests.synthetic import Truth, times
 
 TRIALS = int(os.environ.get("SPRINGMASS_TRIALS", "20"))
@@ -50,7 +49,7 @@ def motions(
 @pytest.mark.parametrize("seconds", [10.0, 60.0])
 def test_nothing_is_found_where_nothing_is(seconds: float, law: str, rho: float) -> None:
     """At most 1 % of clean records show a mode, in white noise and in correlated."""
-    modes = sum(bool(motion_of(each).modes.members) for each, _ in motions(seconds, law=law, rho=rho))
+    modes = sum(bool(each.oscillation.modes.members) for each, _ in motions(seconds, law=law, rho=rho))
     assert modes <= 0.01 * TRIALS + 3.3 * math.sqrt(0.01 * 0.99 * TRIALS)
 
 
@@ -59,7 +58,7 @@ def test_nothing_is_found_where_nothing_is(seconds: float, law: str, rho: float)
 def test_what_is_there_is_found(seconds: float, rho: float) -> None:
     """A mode of 0.5 mm in 0.3 mm of noise is found in 95 % of records."""
     modes = sum(
-        any(abs(x.frequency_hz - 0.803) < 1.0 / seconds for x in motion_of(each).modes.members if x.kind == "mode")
+        any(abs(x.frequency_hz - 0.803) < 1.0 / seconds for x in each.oscillation.modes.members if x.kind == "mode")
         for each, _ in motions(seconds, rho=rho, mode_m=5e-4)
     )
     assert modes >= 0.95 * TRIALS - 3.3 * math.sqrt(0.05 * 0.95 * TRIALS)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.analyse import analyse
-from pipeline.analysis import Analysis, Oscillation
+from pipeline.analysis import Analysis
 from pipeline.bench.scene import Scene
 from pipeline.track import Track
 from tests.sampling import sampled
@@ -24,8 +24,7 @@ def codes(analysis: Analysis, *severities: str) -> set[str]:
 
 def pulled(analysis: Analysis, period_s: float) -> float:
     """Return the error of the angular frequency in standard uncertainties of the recording, without the clock's."""
-    assert isinstance(analysis.motion, Oscillation)
-    omega = analysis.motion.phase.angular_frequency
+    omega = analysis.oscillation.phase.angular_frequency
     return (omega.value - 2.0 * math.pi / period_s) / omega.u
 
 

@@ -16,7 +16,6 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import classic
 from pipeline.several.compare import SpringRun
 from pipeline.track import Track
-from tests.motion import motion_of
 from tests.sampling import sampled
 from tests.synthetic import Truth, noisy, times
 
@@ -48,8 +47,8 @@ def test_the_same_numbers_give_the_same_results_in_their_own_unit(unit: str) -> 
         mine, its = other.estimates[name], length.estimates[name]
         assert (mine.value, mine.u) == (its.value, its.u)
         assert (mine.unit, its.unit) == (unit, "m")
-    assert motion_of(other).damping.selected == motion_of(length).damping.selected == "linear+quadratic"
-    units = dict(zip(*(getattr(motion_of(other).damping.best.joint, each) for each in ("names", "units")), strict=True))
+    assert other.damping.selected == length.damping.selected == "linear+quadratic"
+    units = dict(zip(*(getattr(other.damping.best.joint, each) for each in ("names", "units")), strict=True))
     per = {
         "rad": "1/(rad s)",
         "V": "1/(V s)",
@@ -67,11 +66,10 @@ def test_the_same_numbers_give_the_same_results_in_their_own_unit(unit: str) -> 
 def test_no_number_is_in_metres_where_nothing_was_measured_in_them(unit: str) -> None:
     """Units of estimates, budgets, laws and effects, with a bench that knows everything."""
     found = analyse(track(unit), SCENE)
-    motion = motion_of(found)
     units = {name: each.unit for name, each in found.estimates.items()}
     units |= {f"budget {name}": each.estimate.unit for name, each in found.derived.budgets.items()}
     units |= {f"effect {each.name}": each.unit for each in found.effects}
-    for name, fit in motion.damping.fits.items():
+    for name, fit in found.damping.fits.items():
         units |= {f"{name} {x}": own for x, own in zip(fit.joint.names, fit.joint.units, strict=True)}
     needless = {name for name, own in units.items() if re.search(r"\bm\b", own.replace(unit, ""))}
     # A mass and a period give N/m whatever was recorded; an acceleration gives lengths by omega^2.

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.analyse import Analysis, Oscillation, analyse
+from pipeline.analyse import Analysis, analyse
 from pipeline.bench.scene import Scene
 from pipeline.damping.laws import LAWS
 from pipeline.damping.laws.of_function import FunctionLaw, make_law
@@ -25,20 +25,18 @@ def three_halves(**options: Any) -> FunctionLaw:
     return make_law("three-halves", falling, {"d": (-1 / 2, -1)}, first_guess, **options)
 
 
-def analysed(amplitude: Any, *laws: Any, accuracy: str = "standard", seed: int = 1) -> tuple[Analysis, Oscillation]:
+def analysed(amplitude: Any, *laws: Any, accuracy: str = "standard", seed: int = 1) -> Analysis:
     """Return the analysis of a minute with this amplitude, with these laws beside all others."""
     noise_m = 1e-4 * np.random.default_rng(seed).standard_normal(T.size)
     options = replace(options_for(accuracy), laws=(*LAWS, *laws))
-    found = analyse(Track.from_arrays(T, 0.2 + amplitude * np.cos(8.0 * T) + noise_m), options=options)
-    assert isinstance(found.motion, Oscillation)
-    return found, found.motion
+    return analyse(Track.from_arrays(T, 0.2 + amplitude * np.cos(8.0 * T) + noise_m), options=options)
 
 
 @pytest.mark.parametrize("accuracy", ["standard", "best"])
 def test_a_law_of_a_function_is_found_where_it_holds(accuracy: str) -> None:
     """It is selected, and its coefficient is the true one, with the clock in its uncertainty and a budget."""
-    found, motion = analysed(falling(T, 0.05, 0.2), three_halves(words="a law of mine"), accuracy=accuracy)
-    assert motion.damping.selected == "three-halves"
+    found = analysed(falling(T, 0.05, 0.2), three_halves(words="a law of mine"), accuracy=accuracy)
+    assert found.damping.selected == "three-halves"
     d = found.derived.coefficients["d"]
     assert d.unit == "1/(m^1/2 s)"
     assert abs(d.value - 0.2) < 4.0 * d.u < 0.01
