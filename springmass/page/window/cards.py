@@ -20,7 +20,7 @@ from pipeline.damping.laws import LAWS, words_of
 from springmass.errors import ProgramError
 from springmass.loading.inputs import velocity_name
 from springmass.page.window.processes import Children, ProcessEnded
-from springmass.page.window.recording import Recorder
+from springmass.page.window.recording import RecorderProcess
 from springmass.result.output_names import plain_name
 
 MOST_OF_FILE, MOST_TOGETHER, MOST_FILES = 200_000_000, 1_000_000_000, 200
@@ -93,7 +93,7 @@ class Cards:
         self._drops: dict[tuple[str, str], Path] = {}
         self._tasks: set[asyncio.Task[None]] = set()
         self._turned = asyncio.Event()
-        self.recorder = Recorder(self._top)
+        self.recorder = RecorderProcess(self._top)
         self._recorder = self.recorder.message()
 
     # What other windows left.

@@ -23,7 +23,7 @@ from springmass.session.file_names import default_name
 SIMULATED = "simulate"
 
 
-class Recorder:
+class RecorderProcess:
     """The last recorder that a window of this user started, found again by what it wrote."""
 
     def __init__(self, folder: Path) -> None:
