@@ -120,7 +120,8 @@ class Children:
             if child is None:
                 self.prepare()
                 assert self._spare is not None
-                child, self._spare = await self._spare, None
+                spare, self._spare = self._spare, None  # before it is awaited: no other holder may have it too
+                child = await spare
             self._busy[holder] = child
             try:
                 async for answer in child.ask(request, LONGEST_S + LONGEST_S_PER_MB * size * 1e-6):
