@@ -80,9 +80,9 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
 
 
 def of_samples(scene: Scene) -> tuple[object, ...]:
-    """Return what :func:`measure` uses of a scene: the stated law, the sensor, and whether there is a spring."""
+    """Return what :func:`measure` uses of a scene: the stated law, the sensor, a pendulum, whether it has a spring."""
     sensor = (value for name, value in vars(scene).items() if name.startswith("sensor_"))
-    return scene.damping_law, scene.hangs_on_spring, *sensor
+    return scene.damping_law, scene.hangs_on_spring, scene.pendulum_length_m, *sensor
 
 
 @one_thread
@@ -101,11 +101,11 @@ def measure(track: Track, scene: Scene, options: Options) -> Measured:
         samples = condition(samples.less(line.wave).track)
     part = find_part(samples)
     motion, samples = fit_motion(part, options), part.samples
-    if isinstance(motion, Oscillation) and scene.pendulum_length_m is not None:
-        motion = with_law_of_pendulum(motion, scene.pendulum_length_m, samples.track.unit)
     if apart:
         samples, motion = _with_lines(samples, motion, np.sum([line.wave for line in apart], axis=0))
     motion, differ = compare_halves(motion)
+    if isinstance(motion, Oscillation) and scene.pendulum_length_m is not None:
+        motion = with_law_of_pendulum(motion, scene.pendulum_length_m, samples.track.unit)
     notices, misfits = judge(samples, motion, scene, part.lost)
     return Measured(part, samples, motion, tuple(apart), (*differ, *notices), misfits, options)
 

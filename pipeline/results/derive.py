@@ -158,7 +158,7 @@ def _closed(track: Track, motion: Relaxation | TwoModes | Rest, scene: Scene, in
     instrument, unit = Instrument.of(track), track.unit
     of_scene = _of_scene(track, scene, {"added_mass", "spring_mass"}, inputs)
     rate, scale = inputs.add("clock_rate", instrument.clock_rate, "B"), of_scene["distance_scale"]
-    x = dict(zip(motion.joint.names, inputs.add_joint("fitted_motion", motion.joint, "A", motion.dof), strict=True))
+    x = dict(zip(motion.joint.names, inputs.add_joint("fitted_motion", motion.joint, motion.dof), strict=True))
     known = {
         "time_factor": rate,
         "rest_position": x["rest"],
@@ -319,7 +319,7 @@ def _amiss(misfits: tuple[Misfit, ...], inputs: Inputs) -> Mapping[str, Any]:
             "damping_rate": misfit.damping_rate,
             "clock": misfit.clock,
         }
-        variables = inputs.add_alternatives(misfit.name, {name: size**2 for name, size in sizes.items()}, "B")
+        variables = inputs.add_alternatives(misfit.name, {name: size**2 for name, size in sizes.items()})
         for name, variable in variables.items():
             by_name[name] = by_name[name] + variable
     return by_name
@@ -357,7 +357,7 @@ class _Laws:
         weights = np.array([one.weight for one in self.weighted])
         weights /= weights.sum()
         self.values: F8 = weights @ each
-        self.variables = inputs.add_joint("damping_law", self.stated.joint, "A", self.stated.dof)
+        self.variables = inputs.add_joint("damping_law", self.stated.joint, self.stated.dof)
         departures = [x - value for x, value in zip(self.variables, self.stated.joint.values.tolist(), strict=True)]
         slopes = math.sqrt(weights[0]) * found[0][2]
         quantities = self.values + slopes @ np.array(departures)
@@ -369,7 +369,7 @@ class _Laws:
                 if one.fit is not self.stated:
                     covariance += weight * factor @ factor.T
             joint = Joint(("amplitude", "damping_rate", "displacement"), np.zeros(3), covariance, ("m", "1/s", "m"))
-            quantities = quantities + np.array(inputs.add_joint("choice_of_law", joint, "A"))
+            quantities = quantities + np.array(inputs.add_joint("choice_of_law", joint))
         self.start, self.rate_at_start, self.root_mean_square = quantities.tolist()
         if damping.by_statement or damping.admissible:
             return
@@ -377,7 +377,7 @@ class _Laws:
         local = local_decay(elapsed, windows.amplitude, expected, damping.scatter, best.joint.units[0])
         if local is not None:
             self.values = np.array([*local.values, self.values[2]])
-            self.start, self.rate_at_start = inputs.add_joint("local_decay", local, "A")
+            self.start, self.rate_at_start = inputs.add_joint("local_decay", local)
 
     def coefficients(self, rate: Any, scale: Any, lam: Any, start: Any) -> dict[str, tuple[Any, str]]:
         """Return the coefficients of the law of the results, in true seconds and metres.

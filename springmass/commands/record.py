@@ -60,7 +60,6 @@ from storage.recovery.recover import recover
 from storage.recovery.report import RecoveredRun, RecoverReport
 from storage.run_file.reading import open_run
 
-U_RULER_M = 0.5e-3
 SIMULATED_FAMILY = "line-protocol"
 UNLIMITED_S = 3600.0  # assumed duration of a run without --seconds, for the check of disk space
 
@@ -354,12 +353,12 @@ class _Bench:
         if not ruler:
             return self._still(seconds, "let the bob hang still")
         if len(ruler) == 1:
-            return self.session.calibrate([self._still(seconds, "let the bob hang still")], ruler, U_RULER_M)
+            return self.session.calibrate([self._still(seconds, "let the bob hang still")], ruler)
         points = []
         for distance_m in ruler:
             self._ask(f"bring the target to {distance_m:g} m by the ruler, then press Enter")
             points.append(self._still(seconds, "keep it still"))
-        self.session.calibrate(points, ruler, U_RULER_M)
+        self.session.calibrate(points, ruler)
         calibration = self.session.sensors[0].calibration
         scale = Estimate(calibration.scale, calibration.u_scale)
         offset = Estimate(calibration.offset_m, calibration.u_offset_m, "m")

@@ -125,7 +125,7 @@ def all_sound(graded: Mapping[str, Graded]) -> bool:
     return bool(graded) and all(of_value.grade == "sound" for of_value in graded.values())
 
 
-def grades_text(analysis: Analysis, *, page: bool = False) -> str:
+def grades_text(analysis: Analysis, *, page: bool) -> str:
     """Return the symbols of Table 1 in groups: sound, uncertain and not to be quoted, each with its reason."""
     by_name = grades_of(analysis)
     groups: dict[Grade, dict[str, list[str]]] = {grade: {} for grade in GRADES}

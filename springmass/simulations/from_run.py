@@ -17,7 +17,7 @@ from springmass.errors import UNREADABLE, ProgramError
 SCENE_KEYS = {"gamma": "gamma_per_s", "beta": "beta_per_m_s", "mu": "mu_m_per_s"}
 
 
-def scene_from_run(scene: Scene, analysis: Analysis, *, damping: bool = True) -> tuple[Scene, Joint]:
+def scene_from_run(scene: Scene, analysis: Analysis, *, damping: bool) -> tuple[Scene, Joint]:
     """Return a scene completed with values from a run's analysis, and the joint distribution of those values.
 
     The start is always taken from the run, because nobody releases a bob exactly at the first sample; the damping only

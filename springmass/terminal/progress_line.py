@@ -5,7 +5,7 @@ from __future__ import annotations
 from springmass.runs.rolling import NotYet
 from springmass.session.live_state import Progress, TroubleKind
 from springmass.terminal.console import Console
-from springmass.terminal.style import PLAIN, TerminalStyle, concise, shown
+from springmass.terminal.style import TerminalStyle, concise, shown
 
 # Without a terminal, one of this many lines is printed: the motion for each would add a tenth to the recording's cost.
 UNWATCHED_LINES = 30
@@ -20,7 +20,7 @@ class ProgressLine:
     With ``keys``, marks can be typed.
     """
 
-    def __init__(self, console: Console, style: TerminalStyle = PLAIN, *, keys: bool = False) -> None:
+    def __init__(self, console: Console, style: TerminalStyle, *, keys: bool) -> None:
         self._console, self._style = console, style
         self._help = "space marks, Ctrl-C stops" if keys else "Ctrl-C stops"
         self._turns = 0

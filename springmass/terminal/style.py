@@ -22,9 +22,6 @@ class TerminalStyle:
     width: int = WIDEST
 
 
-PLAIN = TerminalStyle()
-
-
 def style_of(stream: TextIO, *, si: bool = False) -> TerminalStyle:
     """Return the style of a stream; a pipe, a file or a terminal without a movable cursor gets plain ASCII."""
     if not watched(stream):

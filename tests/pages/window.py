@@ -132,7 +132,7 @@ class WindowClient(Client):
                 message = json.loads(events.recv(timeout=LIMIT_S))
                 if message["type"] == "cards":
                     order, self.earlier = message["order"], message["earlier"]
-                else:
+                elif message["type"] == "card":
                     cards[message["id"]] = message
                 found = [cards[each] for each in order or () if each in cards]
                 done = all(card["stage"] in ("done", "question", "failed") for card in found)

@@ -335,6 +335,21 @@ function makeButton(words, act, name) {
   button.addEventListener("click", () => act(button));
   return button;
 }
+// Copy a text to the clipboard, even from a page that was opened from the disk.
+async function copyText(text) {
+  if (navigator.clipboard && isSecureContext) {
+    try { await navigator.clipboard.writeText(text); return true; } catch { /* not allowed: use execCommand below */ }
+  }
+  const area = document.createElement("textarea");
+  area.value = text;
+  area.style.cssText = "position: fixed; opacity: 0;";
+  document.body.append(area);
+  area.select();
+  const done = document.execCommand("copy");
+  area.remove();
+  return done;
+}
+
 function makeBox(name, parent) {
   const box = document.createElement("div");
   box.className = name;

@@ -15,9 +15,12 @@ from typing import Any
 
 from platformdirs import user_state_path
 
+from acquisition.units import MEASURES, TIMES
 from pipeline.damping.laws import LAWS, words_of
+from springmass.errors import ProgramError
 from springmass.loading.inputs import velocity_name
 from springmass.page.window.processes import Children, ProcessEnded
+from springmass.page.window.recording import RecorderProcess
 from springmass.result.output_names import plain_name
 
 MOST_OF_FILE, MOST_TOGETHER, MOST_FILES = 200_000_000, 1_000_000_000, 200
@@ -90,14 +93,15 @@ class Cards:
         self._drops: dict[tuple[str, str], Path] = {}
         self._tasks: set[asyncio.Task[None]] = set()
         self._turned = asyncio.Event()
-        self.touch()
+        self.recorder = RecorderProcess(self._top)
+        self._recorder = self.recorder.message()
 
     # What other windows left.
 
     def _sweep(self) -> list[dict[str, Any]]:
         """Remove what windows left a day ago, and return what later ones left, the latest first."""
         found = []
-        for folder in self._top.iterdir():
+        for folder in filter(Path.is_dir, self._top.iterdir()):
             age_s = time.time() - folder.stat().st_mtime
             cards = [json.loads(path.read_text("utf-8")) for path in folder.glob("*/card.json")]
             names = [card["name"] for card in cards if not card["saved"]]
@@ -127,9 +131,22 @@ class Cards:
                 path.unlink()
         self._change()
 
-    def touch(self) -> None:
-        """Show other windows that this one has not ended."""
+    def look(self) -> bool:
+        """Show other windows that this one has not ended, and open a finished recording; return whether one goes on."""
         os.utime(self.folder)
+        if (run := self.recorder.finished()) is not None:
+            self.open_paths([run], {})
+        if (seen := self.recorder.message()) != self._recorder:
+            self._recorder = seen
+            self._change()
+        return self.recorder.running
+
+    def record(self, asked: Mapping[str, Any]) -> None:
+        """Start a recorder."""
+        try:
+            self.recorder.start(asked)
+        except (ProgramError, OSError) as error:
+            raise NotTaken(str(error)) from error
 
     async def close(self) -> None:
         """End all processes; cards that are not saved stay for a day."""
@@ -374,8 +391,9 @@ class Cards:
     def since(self, revision: int) -> list[dict[str, Any]]:
         """Return the messages for a page that has seen everything up to a revision."""
         laws = [{"value": name, "label": words_of(law)} for name, law in LAWS.items()]
-        order = {"type": "cards", "order": [*self.cards], "earlier": self.earlier, "laws": laws}
-        return [order, *(card.message() for card in self.cards.values() if card.revision > revision)]
+        known = {"laws": laws, "units": [*MEASURES], "times": [*TIMES]}
+        order = {"type": "cards", "order": [*self.cards], "earlier": self.earlier, **known}
+        return [order, self._recorder, *(card.message() for card in self.cards.values() if card.revision > revision)]
 
     async def turned(self) -> None:
         """Wait for a change."""
