@@ -127,7 +127,7 @@ def course(
         groups.setdefault(row.group, []).append(row)
     x, ordered = [], []
     for place, group in enumerate(groups.values(), 1):
-        x += [place + BESIDE * ((i + 0.5) / len(group) - 0.5) for i in range(len(group))]
+        x += [place + GROUP_WIDTH * ((i + 0.5) / len(group) - 0.5) for i in range(len(group))]
         ordered += group
     at, values, us = np.array(x), np.array([row.value for row in ordered]), np.array([row.u for row in ordered])
     apart = np.array([row.run in differing for row in ordered])
@@ -147,7 +147,7 @@ def course(
     return Chart("course", "All runs", caption, (panel,))
 
 
-BESIDE = 0.6  # width of the place of a group, of the distance between two groups
+GROUP_WIDTH = 0.6  # width of the place of a group, of the distance between two groups
 MOST_BINS, FEWEST_BINS = 60, 8
 
 
