@@ -15,6 +15,7 @@ from pipeline.motion.fitted import Oscillation
 from pipeline.motion.lines import WEAKER, find_several
 from pipeline.motion.relaxation import LEAST_DAMPING, Relaxation, find_relaxation
 from pipeline.motion.two_modes import TwoModes, find_two_modes
+from pipeline.numerics.levels import NEGLIGIBLE
 from pipeline.options import Options
 from pipeline.parts.part import Part, check_sinusoid, start_of
 from pipeline.samples.condition import COARSE, Samples
@@ -34,7 +35,7 @@ def fit_motion(part: Part, options: Options) -> Motion:
     if isinstance(windows, NoOscillation):
         return _without_cycles(samples, windows)
     if (bent := check_sinusoid(samples, windows)) is not None:
-        return _without_cycles(samples, bent)
+        return _without_cycles(samples, bent, _strongest_lines(samples))
     windows, modes = separate(samples, windows, sought=options.modes and part.walk is None)
     windows = rounded(windows, samples.quantum)
     start_s, coarse = start_of(samples, windows.angular_frequency), (samples.quantum or 0.0) > COARSE * windows.noise
@@ -55,16 +56,22 @@ def fit_motion(part: Part, options: Options) -> Motion:
         return two
     if incoherent is None:
         return fitted
-    lines = find_several(samples)
-    listed = "" if lines is None else f"; the strongest lines are {lines.listed(samples.track.unit)}"
-    return rest_of(samples, f"{incoherent.why}{listed}")
+    return rest_of(samples, f"{incoherent.why}{_strongest_lines(samples)}")
 
 
-def _without_cycles(samples: Samples, why: NoOscillation) -> Relaxation | TwoModes | Rest:
+def _without_cycles(samples: Samples, why: NoOscillation, lines: str = "") -> Relaxation | TwoModes | Rest:
     relaxed = find_relaxation(samples)
     if isinstance(relaxed, Relaxation):
         return relaxed
-    return find_two_modes(samples) or rest_of(samples, (relaxed or why).why)
+    return find_two_modes(samples) or rest_of(samples, f"{(relaxed or why).why}{lines}")
+
+
+def _strongest_lines(samples: Samples) -> str:
+    """Return the lines that make up nearly all of a record, in words; empty if there are none."""
+    lines = find_several(samples)
+    if lines is None or lines.left > NEGLIGIBLE:
+        return ""
+    return f"; the strongest lines are {lines.listed(samples.track.unit)}"
 
 
 def _averaged(windows: Windows, modes: Modes, laws: Damping, samples: Samples, options: Options) -> Oscillation:

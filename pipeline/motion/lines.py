@@ -10,7 +10,15 @@ from typing import Literal
 import numpy as np
 
 from pipeline.motion.fit import Rows, fit
-from pipeline.numerics.levels import FEWEST_FOR_CURVE, IMPROBABLE, NEGLIGIBLE, NOTICEABLE, OUTLIER, ROUNDS
+from pipeline.numerics.levels import (
+    FEWEST_FOR_CURVE,
+    FEWEST_FOR_MEDIAN,
+    IMPROBABLE,
+    NEGLIGIBLE,
+    NOTICEABLE,
+    OUTLIER,
+    ROUNDS,
+)
 from pipeline.numerics.regression import correlation_length
 from pipeline.numerics.robust import median
 from pipeline.samples.condition import Samples
@@ -25,7 +33,7 @@ MOST = 100_000  # maximum number of median spacings, whose fit takes 0.3 s as me
 MAINS_HZ, MAINS_SHARE = (50.0, 60.0, 100.0, 120.0), 0.01
 # Ratio to the main frequency from which a line is an overtone; the modes in windows are sought below it.
 OVERTONE = 3.4
-APART = 3.0  # least distance of two lines in reciprocals of the record's length; sidebands of a decay lie within it
+APART = 1.0  # least distance of two lines in reciprocals of the length of the record, as those of a beat
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,12 +231,8 @@ def find_apart(samples: Samples) -> Apart | None:
         return None
     omega, power = record.spectrum(record.values)
     first = float(omega[np.argmax(power)])
-    for second in (record.strongest(record.less(record.linear((first, 0.0)))), *_above(record, first, omega, power)):
-        start = record.linear((first, 0.0), (second, 0.0))
-        near = abs(second - first) * record.seconds < APART * math.tau
-        if near or np.hypot(*start[5:7]) < 0.5 * NEGLIGIBLE * np.hypot(*start[1:3]):
-            continue
-        lines = record.fitted(start)
+    for second in _others(record, first, omega, power):
+        lines = record.fitted(record.linear((first, 0.0), (second, 0.0)))
         # What the two leave beyond the noise must be below a tenth of what they describe.
         if lines is None or lines.left > min(NEGLIGIBLE**2 + (samples.noise / record.scale) ** 2, NEGLIGIBLE):
             continue
@@ -241,14 +245,22 @@ def find_apart(samples: Samples) -> Apart | None:
     return None
 
 
-def _above(record: Scaled, first: float, omega: F8, power: F8) -> Iterator[float]:
-    """Yield the highest line far above the first one and beside its multiples, if it is none of the noise."""
+def _others(record: Scaled, first: float, omega: F8, power: F8) -> Iterator[float]:
+    """Yield the highest line beside a steady first one, and that far above it and beside its multiples.
+
+    Neither may be one of the noise, nor a sideband of the first one's decay.
+    """
+    left = record.spectrum(record.less(record.linear((first, 0.0))))[1]
+    room = APART * math.tau / record.seconds
     beside = np.abs(omega - first * np.round(omega / first))
-    far = (omega > OVERTONE * first) & (beside > APART * math.tau / record.seconds + NOTICEABLE * omega)
-    if np.count_nonzero(far) > FEWEST_FOR_CURVE:
-        peak = float(np.max(power[far]))
-        if peak > math.log(record.tau.size / IMPROBABLE) * median(power[far]) / math.log(2.0):
-            yield float(omega[far][np.argmax(power[far])])
+    far = (omega > OVERTONE * first) & (beside > room + NOTICEABLE * omega)
+    for powers, among in ((left, left > 0.0), (power, far)):
+        if np.count_nonzero(among) <= FEWEST_FOR_CURVE:
+            continue
+        peak, line = float(np.max(powers[among])), float(omega[among][np.argmax(powers[among])])
+        floor = median(powers[among]) / math.log(2.0)
+        if abs(line - first) > room and peak > math.log(record.tau.size / IMPROBABLE) * floor:
+            yield line
 
 
 def _cause(lines: DecayingLines, number: int) -> Literal["drive", "mains", "overtone"] | None:
@@ -256,8 +268,10 @@ def _cause(lines: DecayingLines, number: int) -> Literal["drive", "mains", "over
     other, sizes, omegas, rates = 1 - number, lines.sizes, lines.omegas, lines.rates
     mains = any(abs(float(omegas[number]) / math.tau - each) < MAINS_SHARE * each for each in MAINS_HZ)
     u_rates = np.sqrt(np.diag(lines.covariance)[4::4])
-    # The other one must last for several periods, or it is no oscillation but a disturbance at the start.
-    if rates[other] > omegas[other] / (math.tau * ROUNDS):
+    if abs(omegas[0] - omegas[1]) * lines.record.seconds < APART * math.tau:
+        return None  # the fit of a single one that does not fall as an exponential
+    # The other one must last for a few periods, or it is no oscillation but a disturbance at the start.
+    if rates[other] > omegas[other] / (math.tau * FEWEST_FOR_MEDIAN):
         return None
     weights = np.zeros(9)
     weights[[4 + 4 * number, 4 + 4 * other]] = 1.0, -NEGLIGIBLE

@@ -99,3 +99,21 @@ def test_a_shaken_structure_has_a_period_and_no_damping_rate() -> None:
         assert abs(said.errors(record.truth)["period"]) < 3.0
         assert said.values["period"].u > 1e-3 * said.values["period"].value
         assert "damping_rate" not in said.values
+
+
+@pytest.mark.parametrize("ratio", [0.6, 0.95, 1.2])
+@pytest.mark.parametrize("gamma", [0.02, 0.15])
+def test_the_free_oscillation_of_a_driven_bob_is_analysed(ratio: float, gamma: float) -> None:
+    """Its frequency and damping rate are those of the transient, for drives below and above the resonance."""
+    omega, t = 8.3, np.arange(3000) / 50.0
+    drive = ratio * omega
+    x, _ = kinds.solved(
+        lambda at, x, v: -(omega**2) * x - 2.0 * gamma * v + 0.02 * abs(omega**2 - drive**2) * math.sin(drive * at),
+        0.0,
+        t,
+    )
+    found = analyse(Track.from_arrays(t, 0.4 + x + 3e-4 * np.random.default_rng(6).standard_normal(t.size)))
+    free = math.sqrt(omega**2 - gamma**2)
+    assert abs(found.estimates["angular_frequency"].value - free) < 4.0 * found.estimates["angular_frequency"].u
+    assert abs(found.estimates["damping_rate"].value - gamma) < 4.0 * found.estimates["damping_rate"].u
+    assert any(finding.code == "driven" for finding in found.findings)
