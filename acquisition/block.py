@@ -25,7 +25,7 @@ UNITS = {
     "voltage": "V",
     "number": "1",
 }
-"""SI unit of each quantity that a source can measure; `pipeline.track.UNITS` is an identical table."""
+"""SI unit of each quantity that a source can measure; a test compares `pipeline.units.RECORDED_UNITS` with it."""
 
 
 class Flag(enum.IntFlag):

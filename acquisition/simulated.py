@@ -1,7 +1,7 @@
-"""The simulated rangefinder: readings with the errors of a real sensor, also behind a pseudo-terminal.
+"""The simulated rangefinder: readings with the errors of a real sensor, also behind a port.
 
-The real serial code reads the pseudo-terminal like a sensor. It ignores the baud rate, so the clock determines when
-bytes are sent. Every run is reproducible.
+The real serial code reads the port like a sensor: a pseudo-terminal, or a network port on Windows, which has none. It
+ignores the baud rate, so the clock determines when bytes are sent. Every run is reproducible.
 """
 
 from __future__ import annotations
@@ -9,10 +9,11 @@ from __future__ import annotations
 import itertools
 import math
 import os
+import socket
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -125,6 +126,70 @@ class VirtualRangefinder:
         return 0.0
 
 
+class _Line(Protocol):
+    """Where bytes are written that a port reads; ``write`` raises BlockingIOError or ConnectionError if none does."""
+
+    path: str
+
+    def write(self, data: memoryview) -> int: ...
+
+    def close(self) -> None: ...
+
+
+class _PseudoTerminal:
+    """A pseudo-terminal; raises ImportError on Windows."""
+
+    def __init__(self) -> None:
+        import pty
+        import tty
+
+        self._master, self._slave = pty.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.path = os.ttyname(self._slave)
+
+    def write(self, data: memoryview) -> int:
+        return os.write(self._master, data)
+
+    def close(self) -> None:
+        os.close(self._slave)
+        os.close(self._master)
+
+
+class _NetworkPort:
+    """A port of this computer's own network for one reader at a time."""
+
+    def __init__(self) -> None:
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self._listener.setblocking(False)
+        self._reader: socket.socket | None = None
+        self.path = f"socket://127.0.0.1:{self._listener.getsockname()[1]}"
+
+    def write(self, data: memoryview) -> int:
+        if self._reader is None:
+            self._reader, _ = self._listener.accept()
+            self._reader.setblocking(False)
+            self._reader.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        try:
+            return self._reader.send(data)
+        except ConnectionError:
+            self._reader.close()
+            self._reader = None
+            raise
+
+    def close(self) -> None:
+        if self._reader is not None:
+            self._reader.close()
+        self._listener.close()
+
+
+def _line() -> _Line:
+    try:
+        return _PseudoTerminal()
+    except ImportError:
+        return _NetworkPort()
+
+
 class VirtualPort:
     """A simulated sensor that is available as a port, at ``path``, and sends for a number of seconds."""
 
@@ -145,13 +210,8 @@ class VirtualPort:
         self._seconds = seconds
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="springmass-sensor", daemon=True)
-        import pty  # POSIX only
-        import tty
-
-        self._master, self._slave = pty.openpty()
-        tty.setraw(self._slave)
-        os.set_blocking(self._master, False)
-        self.path = os.ttyname(self._slave)
+        self._line = _line()
+        self.path = self._line.path
 
     def __enter__(self) -> VirtualPort:
         return self
@@ -161,8 +221,7 @@ class VirtualPort:
         self._stop.set()
         if self._thread.is_alive():
             self._thread.join()
-        os.close(self._slave)
-        os.close(self._master)
+        self._line.close()
 
     def start(self) -> None:
         """Start measuring and sending."""
@@ -188,6 +247,6 @@ class VirtualPort:
         remaining = memoryview(data)
         while remaining and not self._stop.is_set():
             try:
-                remaining = remaining[os.write(self._master, remaining) :]
-            except BlockingIOError:
+                remaining = remaining[self._line.write(remaining) :]
+            except (BlockingIOError, ConnectionError):  # nobody reads, or nobody yet
                 self._clock.sleep_until_ns(self._clock.now_ns() + 1_000_000)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,11 @@ def entry_points_of(group: str) -> dict[str, EntryPoint]:
     from importlib.metadata import entry_points  # importing it takes longer than all other code of the registries
 
     return {entry.name: entry for entry in entry_points(group=group)}
+
+
+def names_in(group: str, built_in: Iterable[str]) -> tuple[str, ...]:
+    """Return the names of what is built in, then of what other packages add to a group."""
+    return tuple(dict.fromkeys((*built_in, *entry_points_of(group))))
 
 
 def load_entry(

@@ -3,44 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.bench.scene import Scene
 from pipeline.checks.echoes import count_quality
+from pipeline.damping.select import NO_LAWS, Damping
 from pipeline.errors import AnalysisError
 from pipeline.findings.finding import Finding
-from pipeline.motion.at_rest import Rest
-from pipeline.motion.fitted import Fitted
+from pipeline.motion.fitted import Oscillation
+from pipeline.motion.kinds import Motion
 from pipeline.motion.relaxation import Relaxation
-from pipeline.motion.two_modes import TwoModes
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.threads import one_thread
 from pipeline.options import Options
-from pipeline.results.curves import Smoothed, kinematics
+from pipeline.results.budget import Budget
+from pipeline.results.curves import Curve, Smoothed, drag_curve, energy_curve, kinematics
 from pipeline.results.derive import Derived
 from pipeline.results.effects import Effect
 from pipeline.samples.condition import Samples
 from pipeline.track import U8, UNUSABLE, Track
-from pipeline.windows.cycles import Cycles
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Oscillation(Fitted):
-    """An oscillation, strongly damped or not: its fit and the results derived from it."""
-
-    cycles: Cycles
-    derived: Derived
-
-    @classmethod
-    def of(cls, fitted: Fitted, cycles: Cycles, derived: Derived) -> Oscillation:
-        """Return a fit with its results."""
-        return cls(**{each.name: getattr(fitted, each.name) for each in fields(fitted)}, cycles=cycles, derived=derived)
-
-
-Motion = Oscillation | Relaxation | TwoModes | Rest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,6 +44,26 @@ class Analysis:
     effects: tuple[Effect, ...]
     findings: tuple[Finding, ...]  # the most severe first
     derived: Derived  # estimates and their budgets
+
+    @property
+    def oscillation(self) -> Oscillation | None:
+        """The fit, if the motion is an oscillation; what every kind has is in the other attributes."""
+        return self.motion if isinstance(self.motion, Oscillation) else None
+
+    @property
+    def damping(self) -> Damping:
+        """The damping laws; there are none without an oscillation."""
+        return self.motion.damping if isinstance(self.motion, Oscillation) else NO_LAWS
+
+    @property
+    def budgets(self) -> Mapping[str, Budget]:
+        """The uncertainty budgets that are shown, by name: those of an oscillation."""
+        return self.derived.budgets if isinstance(self.motion, Oscillation) else {}
+
+    @property
+    def ok(self) -> bool:
+        """Whether the run oscillates or relaxes, so that there is something to report."""
+        return isinstance(self.motion, Oscillation | Relaxation)
 
     @property
     def flags(self) -> U8:
@@ -96,4 +100,19 @@ class Analysis:
         """
         if not isinstance(self.motion, Oscillation):
             raise AnalysisError(f"there is no oscillation to smooth: {self.motion.why}")
-        return kinematics(self.track, self.motion, self.motion.derived.laws)
+        return kinematics(self.track, self.motion, self.derived.laws)
+
+    def energy_curve(self) -> Curve | None:
+        """Return the mechanical energy against time with its band, in J, or in J/kg if no mass is known."""
+        motion, derived = self.oscillation, self.derived
+        if motion is None or derived.half_stiffness is None:
+            return None
+        unit = "J/kg" if derived.effective_mass_kg is None else "J"
+        return energy_curve(motion.damping, motion.windows, derived.half_stiffness, derived.laws, unit)
+
+    def drag_curve(self) -> Curve | None:
+        """Return the drag coefficient against amplitude with its band."""
+        motion, length = self.oscillation, self.derived.drag_length
+        if motion is None or length is None:
+            return None
+        return drag_curve(motion.damping, motion.windows, length, self.derived.laws)

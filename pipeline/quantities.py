@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from pipeline.units import Unit
 
-# What a value may come from: the times and the distances (or other values) of the record, the scene, one frequency, and
-# a law of damping.
-MODEL_PARTS = ("times", "distances", "scene", "frequency", "damping")
+# What a value may come from: the times and the distances (or other values) of the record, the scene, one frequency, its
+# change with the amplitude, and a law of damping.
+MODEL_PARTS = ("times", "distances", "scene", "frequency", "small_swings", "damping")
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,14 +47,14 @@ class Input:
 
 
 _OF_TIMES, _OF_SIZES = ("times",), ("distances",)
-_OF_PHASE = ("times", "frequency")
+_OF_PHASE, _OF_SMALL = ("times", "frequency"), ("times", "small_swings")
 _OF_MOTION = ("distances", *_OF_PHASE)
 _OF_RATE, _OF_DRAG = ("times", "damping"), ("distances", "times", "damping")
 _OF_FLOW = (*_OF_MOTION, "scene")
 
 _QUANTITIES = (
     Quantity("period", "period", "T", "T", "T", "s", _OF_PHASE),
-    Quantity("period_small_swings", "period of very small swings", "T_s", "T s", r"T_\mathrm{s}", "s", _OF_TIMES),
+    Quantity("period_small_swings", "period of very small swings", "T_s", "T s", r"T_\mathrm{s}", "s", _OF_SMALL),
     Quantity("first_mode_period", "period of the first mode", "T_1", "T 1", "T_1", "s", _OF_TIMES),
     Quantity("second_mode_period", "period of the second mode", "T_2", "T 2", "T_2", "s", _OF_TIMES),
     Quantity("first_mode_amplitude", "amplitude of the first mode", "A_1", "A 1", "A_1", Unit(1), _OF_SIZES),
@@ -62,7 +62,7 @@ _QUANTITIES = (
     Quantity("frequency", "frequency", "f", "f", "f", "Hz", _OF_PHASE),
     Quantity("angular_frequency", "angular frequency", "omega", "ω", r"\omega", "rad/s", _OF_PHASE),
     Quantity("spring_constant", "spring constant", "k", "k", "k", "N/m", (*_OF_PHASE, "scene")),
-    Quantity("gravity", "acceleration of gravity", "g", "g", "g", "m/s^2", ("times", "scene")),
+    Quantity("gravity", "acceleration of gravity", "g", "g", "g", "m/s^2", (*_OF_SMALL, "scene")),
     Quantity("amplitude", "amplitude at the start", "A0", "A₀", "A_0", Unit(1), _OF_SIZES),
     Quantity("displacement_amplitude", "amplitude of the displacement", "x0", "x₀", "x_0", "m", _OF_MOTION),
     Quantity("angle_amplitude", "amplitude of the angle", "theta0", "θ₀", r"\theta_0", "rad", _OF_MOTION),

@@ -9,23 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pipeline.errors import TrackError
+from pipeline.units import RECORDED_UNITS
 
 F8 = NDArray[np.float64]
 U8 = NDArray[np.uint8]
 C16 = NDArray[np.complex128]
 Bools = NDArray[np.bool_]
-
-UNITS = {
-    "length": "m",
-    "angle": "rad",
-    "velocity": "m/s",
-    "angular_velocity": "rad/s",
-    "acceleration": "m/s^2",
-    "force": "N",
-    "voltage": "V",
-    "number": "1",
-}
-"""The quantities that a track may contain, with their SI units; a test compares it with `acquisition.block.UNITS`."""
 
 
 class Quality(enum.IntFlag):
@@ -78,22 +67,22 @@ class Track:
     sonic: bool = False  # whether the distances are those of echoes, whose scale changes with the air
     u_scale: float = 0.0  # relative standard uncertainty of a calibrated scale; 0 without a calibration
     u_offset_m: float = 0.0  # standard uncertainty of a calibrated zero
-    quantity: str = "length"  # an entry of :data:`UNITS` with its unit
-    unit: str = "m"
+    unit: str = "m"  # of :data:`pipeline.units.RECORDED_UNITS`
     trigger_s: float | None = None  # when the trigger saw the bob leave its rest and started the recording
 
     def __post_init__(self) -> None:
-        if UNITS.get(self.quantity) != self.unit:
-            known = ", ".join(f"{quantity} in {unit}" for quantity, unit in UNITS.items())
-            raise TrackError(f"a track holds one of {known}, got {self.quantity} in {self.unit}", "convert to SI first")
+        if self.unit not in RECORDED_UNITS:
+            known = ", ".join(f"{recorded.quantity} in {unit}" for unit, recorded in RECORDED_UNITS.items())
+            raise TrackError(f"a track holds one of {known}, got the unit {self.unit}", "convert to SI first")
 
     def __len__(self) -> int:
         return int(self.t.size)
 
     def demand_length(self, what: str) -> None:
         """Raise an error if the track is no length, which ``what`` needs."""
-        if self.quantity != "length":
-            raise TrackError(f"{what} needs a length in m, got {self.quantity} in {self.unit}", "leave it out")
+        if self.unit != "m":
+            quantity = RECORDED_UNITS[self.unit].quantity
+            raise TrackError(f"{what} needs a length in m, got {quantity} in {self.unit}", "leave it out")
 
     @classmethod
     def from_arrays(
@@ -106,7 +95,6 @@ class Track:
         sigma_m: float | None = None,
         quantum_m: float | None = None,
         kind: str = "replay",
-        quantity: str = "length",
         unit: str = "m",
     ) -> Track:
         """Make a track from array-like objects.
@@ -138,4 +126,4 @@ class Track:
                 raise TrackError(
                     f"{name} must be positive and finite, got {value}", "leave it out where it is not known"
                 )
-        return cls(t_s, y_m, bits, float(rate_hz), sigma_m, quantum_m, kind=kind, quantity=quantity, unit=unit)
+        return cls(t_s, y_m, bits, float(rate_hz), sigma_m, quantum_m, kind=kind, unit=unit)

@@ -10,25 +10,26 @@ from functools import cache
 
 
 @dataclass(frozen=True, slots=True)
-class DisplayUnit:
-    """Name and display unit of the values in one unit."""
+class RecordedUnit:
+    """What a record in one unit contains, and how sentences and figures show it."""
 
+    quantity: str  # as `acquisition.block.UNITS` has it (a test compares them)
     noun: str  # name of one value
     unit: str  # unit in which sentences and figures write the value
-    factor: float  # factor from the record's unit to ``unit``
+    factor: float = 1.0  # factor from the record's unit to ``unit``
 
 
-DISPLAY_UNITS = {
-    "m": DisplayUnit("distance", "mm", 1e3),
-    "rad": DisplayUnit("angle", "rad", 1.0),
-    "m/s": DisplayUnit("velocity", "m/s", 1.0),
-    "rad/s": DisplayUnit("angular velocity", "rad/s", 1.0),
-    "m/s^2": DisplayUnit("acceleration", "m/s^2", 1.0),
-    "N": DisplayUnit("force", "N", 1.0),
-    "V": DisplayUnit("voltage", "V", 1.0),
-    "1": DisplayUnit("value", "", 1.0),
+RECORDED_UNITS = {
+    "m": RecordedUnit("length", "distance", "mm", 1e3),
+    "rad": RecordedUnit("angle", "angle", "rad"),
+    "m/s": RecordedUnit("velocity", "velocity", "m/s"),
+    "rad/s": RecordedUnit("angular_velocity", "angular velocity", "rad/s"),
+    "m/s^2": RecordedUnit("acceleration", "acceleration", "m/s^2"),
+    "N": RecordedUnit("force", "force", "N"),
+    "V": RecordedUnit("voltage", "voltage", "V"),
+    "1": RecordedUnit("number", "value", ""),
 }
-"""Names and display units by the units of :data:`pipeline.track.UNITS`."""
+"""The SI units that a track may have."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,7 +164,7 @@ def amount(value: float, unit: str, form: str = ".2g") -> str:
     >>> amount(0.00234, "m"), amount(23.945, "m", ".4g"), amount(0.0234, "rad"), amount(1.2345678, "V", ".1f")
     ('2.3 mm', '23.95 m', '0.023 rad', '1.235 V')
     """
-    shown = DISPLAY_UNITS[unit]
+    shown = RECORDED_UNITS[unit]
     if unit == "m" and abs(value) >= 1.0:
         return f"{number(value, form if form.endswith('g') else '.4g')} m"
     if unit != "m" and form.endswith("f"):
@@ -173,7 +174,7 @@ def amount(value: float, unit: str, form: str = ".2g") -> str:
 
 def noun(unit: str) -> str:
     """Return the noun for a value of a record in this unit."""
-    return DISPLAY_UNITS[unit].noun
+    return RECORDED_UNITS[unit].noun
 
 
 def plural(unit: str) -> str:
@@ -182,5 +183,5 @@ def plural(unit: str) -> str:
     >>> plural("m"), plural("rad/s")
     ('distances', 'angular velocities')
     """
-    own = DISPLAY_UNITS[unit].noun
+    own = RECORDED_UNITS[unit].noun
     return f"{own[:-1]}ies" if own.endswith("y") else f"{own}s"

@@ -15,23 +15,18 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.analyse import Analysis, analyse
-from pipeline.analysis import Oscillation
-from pipeline.damping.laws import Law, find_law
+from pipeline.analyse import Analysis, Oscillation, analyse
+from pipeline.damping.laws import LAWS, Law, find_law
 from pipeline.errors import DynamicsError, PipelineError
 from pipeline.options import TIERS, options_for
 from pipeline.simulation import Equation, Problem, integrators
 from pipeline.simulation.halving import auto
 from pipeline.simulation.methods import SolveIvp
 from pipeline.track import F8, Track
+from springmass.simulations.from_run import SCENE_KEYS
 from springmass.simulations.simulation import reference
 
 SCORED_QUANTITIES = ("frequency", "amplitude", "damping_rate")
-SCENE_DRAGS = {
-    "gamma": ("linear", "gamma_per_s"),
-    "beta": ("quadratic", "beta_per_m_s"),
-    "mu": ("friction", "mu_m_per_s"),
-}
 STEP_PARTS, RTOLS, TOLERANCES = (1, 4, 16), (1e-6, 1e-9, 1e-12), (1e-3, 1e-6, 1e-9, 1e-12)
 LONGEST_ADAPTIVE = 2e4  # rad; a longer motion takes adaptive methods minutes
 
@@ -63,9 +58,9 @@ class TrueMotion:
     def problem(self) -> Problem | None:
         """Return the equation of the motion and its start; None if its law is no sum of drags."""
         drags = dict(zip([*self.law.parameters][1:], self.theta[1:].tolist(), strict=True))
-        if not drags.keys() <= SCENE_DRAGS.keys():
+        if not drags.keys() <= SCENE_KEYS.keys():
             return None
-        coefficients = {SCENE_DRAGS[name][1]: max(value, 0.0) for name, value in drags.items()}
+        coefficients = {SCENE_KEYS[name]: max(value, 0.0) for name, value in drags.items()}
         return Problem(Equation.from_laws(2.0 * math.pi * self.frequency_hz, **coefficients), float(self.theta[0]))
 
 
@@ -85,8 +80,8 @@ def motion_of(analysis: Analysis, oscillation: Oscillation) -> TrueMotion:
 
 def motion_of_problem(problem: Problem, noise_m: float | None, seconds: float) -> TrueMotion:
     """Return the motion of an equation, released at its greatest displacement."""
-    drags = dict(zip(SCENE_DRAGS, problem.equation.laws(), strict=True))
-    law = find_law("+".join(words for name, (words, _) in SCENE_DRAGS.items() if drags[name]) or "none")
+    drags = {name: size for name, size in zip(SCENE_KEYS, problem.equation.laws(), strict=True) if size}
+    law = next(law for law in LAWS.values() if {*law.parameters} == {"A0", *drags})
     theta = np.array([problem.amplitude_m(), *(drags[each] for each in list(law.parameters)[1:])])
     frequency_hz = problem.equation.angular_frequency_per_s / (2.0 * math.pi)
     return TrueMotion(frequency_hz=frequency_hz, law=law, theta=theta, noise_m=noise_m or 3e-4, seconds=seconds)

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 import re
 import unicodedata
-from collections.abc import Callable
 from typing import NamedTuple
 
 from acquisition.errors import visible
 from pipeline.damping.law_fit import LawFit
 from pipeline.damping.select import Damping
-from pipeline.numerics.estimate import Estimate, UpperLimit, format_limit, format_value, in_brackets
+from pipeline.numerics.estimate import Estimate, UpperLimit
 
 
 class _Written(NamedTuple):
@@ -83,17 +82,16 @@ _FORMULA = ("=", "+", "-", "@", "＝", "＋", "－", "＠")
 """Characters with which a formula begins in a spreadsheet."""
 
 
-def pretty(estimate: Estimate | None, write: Callable[[float, float], str] = format_value) -> str:
-    """Return an estimate for the page: the digits of a function for plain text, typeset.
+def pretty(estimate: Estimate | None, *, brackets: bool = False) -> str:
+    """Return an estimate for the page, with u after ± or in brackets.
 
     >>> pretty(Estimate(-8.36e-5, 9.6e-7, "m"))
     '(−8.360 ± 0.096) × 10⁻⁵ m'
     """
     if estimate is None:
         return "–"
-    if isinstance(estimate, UpperLimit):
-        return f"< {typeset(format_limit(estimate.limit))} {page_unit(estimate.unit)}".rstrip() + " (95 %)"
-    return f"{typeset(write(estimate.value, estimate.u))} {page_unit(estimate.unit)}".rstrip()
+    tail = " (95 %)" if isinstance(estimate, UpperLimit) else ""
+    return f"{typeset(estimate.written(brackets=brackets))} {page_unit(estimate.unit)}".rstrip() + tail
 
 
 def pretty_number(value: float | None, digits: int = 2) -> str:
@@ -164,8 +162,8 @@ def cells(estimate: Estimate | None) -> str:
     if estimate is None:
         return "||"
     if isinstance(estimate, UpperLimit):
-        return f"< {format_limit(estimate.limit)}||{page_unit(estimate.unit)}"
-    value, _, u = format_value(estimate.value, estimate.u).partition(" +- ")
+        return f"{estimate.written()}||{page_unit(estimate.unit)}"
+    value, _, u = estimate.written().partition(" +- ")
     u, _, power = u.partition(")")
     return f"{value.lstrip('(')}{power}|{u}{power}|{page_unit(estimate.unit)}"
 
@@ -245,8 +243,8 @@ def tex_quantity(estimate: Estimate | None) -> str:
     if estimate is None:
         return "--"
     if isinstance(estimate, UpperLimit):
-        return f"$<$ {_tex_number(format_limit(estimate.limit), estimate.unit)} (\\qty{{95}}{{\\percent}})"
-    match = re.fullmatch(r"(-?[\d.]+)(\([\d.]+\))?(?:e([+-]\d+))?", in_brackets(estimate.value, estimate.u))
+        return f"$<$ {_tex_number(estimate.written()[2:], estimate.unit)} (\\qty{{95}}{{\\percent}})"
+    match = re.fullmatch(r"(-?[\d.]+)(\([\d.]+\))?(?:e([+-]\d+))?", estimate.written(brackets=True))
     if match is None:
         return "--"
     # siunitx wants the u in the last digit: 13.9(12) for 13.9(1.2).

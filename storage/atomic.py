@@ -12,14 +12,11 @@ import errno
 import hashlib
 import os
 import shutil
-import sys
 from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 
 from storage.errors import RunExists, WriteFailed, one_line
-
-if sys.platform != "win32":
-    import fcntl
+from storage.locks import lock
 
 # Some network and FUSE file systems cannot sync a folder, and Windows cannot even open one.
 _FOLDER_CANNOT_SYNC = {errno.EINVAL, errno.ENOTSUP, errno.EACCES, errno.EBADF}
@@ -82,22 +79,19 @@ def part_of(target: Path) -> Path:
 
 
 def lock_new(path: Path, opened: Callable[[Path], int]) -> int | None:
-    """Create and lock a temporary file or folder; return its descriptor, or None on Windows, which has no such lock."""
+    """Create and lock a temporary file or folder; return its descriptor, or None where there are no locks."""
     while True:
-        descriptor = opened(path)
-        if sys.platform == "win32":
-            os.close(descriptor)
-            return None
+        descriptor, keeps = opened(path), False
         try:
-            with contextlib.suppress(OSError):  # a file system without locks
-                fcntl.flock(descriptor, fcntl.LOCK_EX)
-            with contextlib.suppress(FileNotFoundError):
-                if os.path.samestat(os.fstat(descriptor), os.lstat(path)):
-                    return descriptor
-        except BaseException:  # a Ctrl-C: the next writer of this process must not wait for this lock
-            os.close(descriptor)
-            raise
-        os.close(descriptor)  # the writer that held the lock has moved or removed the file
+            if not lock(descriptor, wait=True):
+                return None
+            with contextlib.suppress(FileNotFoundError):  # the writer that held the lock has moved or removed the file
+                keeps = os.path.samestat(os.fstat(descriptor), os.lstat(path))
+            if keeps:
+                return descriptor
+        finally:
+            if not keeps:  # also after a Ctrl-C: the next writer of this process must not wait for this lock
+                os.close(descriptor)
 
 
 def _open_file(path: Path) -> int:
@@ -177,7 +171,7 @@ def whole_folder(path: str | os.PathLike[str], names: Collection[str], last: str
     folder cannot be made; after an error of the body the old files are unchanged.
     """
     target = Path(path).resolve()
-    part, lock = part_of(target), None
+    part, held = part_of(target), None
     with writing(path):
         if target.exists() and not target.is_dir():
             raise NotADirectoryError(errno.ENOTDIR, "a file of that name exists")
@@ -185,7 +179,7 @@ def whole_folder(path: str | os.PathLike[str], names: Collection[str], last: str
         if os.name == "nt":
             part.mkdir(exist_ok=True)
         else:
-            lock = lock_new(part, _open_folder)
+            held = lock_new(part, _open_folder)
     try:
         with writing(path):
             for leftover in part.iterdir():
@@ -197,8 +191,8 @@ def whole_folder(path: str | os.PathLike[str], names: Collection[str], last: str
             sync_folder(target.parent)
     finally:
         shutil.rmtree(part, ignore_errors=True)
-        if lock is not None:
-            os.close(lock)
+        if held is not None:
+            os.close(held)
 
 
 def remove_files(path: str | os.PathLike[str], names: Collection[str], last: str) -> None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from acquisition.decoders.decoder import Guess
 from acquisition.decoders.sensor import Sensor
 from acquisition.errors import SensorError
-from failure.extensions import entry_points_of, load_named
+from failure.extensions import load_named, names_in
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -37,21 +37,19 @@ _ENOUGH = 0.5
 
 def families() -> tuple[Sensor, ...]:
     """Return all families, with those of this package first."""
-    return (
-        *map(_built_in, _MODULES),
-        *(_added(name) for name in entry_points_of(SENSORS_GROUP) if name not in _MODULES),
-    )
+    return tuple(map(get_family, names_in(SENSORS_GROUP, _MODULES)))
 
 
 def get_family(name: str) -> Sensor:
     """Return the family with a given name; the SensorError of an unknown name lists the known ones."""
     if name in _MODULES:
-        return _built_in(name)
-    entries = entry_points_of(SENSORS_GROUP)
-    if name in entries:
-        return _added(name)
-    names = ", ".join(dict.fromkeys([*_MODULES, *entries]))
-    raise SensorError(f"sensor must be one of {names}, got {name!r}")
+        module = import_module(f"acquisition.decoders.{_MODULES[name]}")
+        family: Sensor = module.FAMILIES[name] if hasattr(module, "FAMILIES") else module.FAMILY
+    elif name in (names := names_in(SENSORS_GROUP, _MODULES)):
+        family = load_named(SENSORS_GROUP, name, Sensor, SensorError)
+    else:
+        raise SensorError(f"sensor must be one of {', '.join(names)}, got {name!r}")
+    return family
 
 
 def probe(data: bytes) -> list[str]:
@@ -125,14 +123,3 @@ def _share(family: Sensor, data: bytes) -> float:
     readings = decoder.feed(0, data)
     whole = len(data) - decoder.pending
     return 1 - decoder.faults.get("garbage_bytes", 0) / whole if len(readings) else 0.0
-
-
-def _built_in(name: str) -> Sensor:
-    module = import_module(f"acquisition.decoders.{_MODULES[name]}")
-    family: Sensor = module.FAMILIES[name] if hasattr(module, "FAMILIES") else module.FAMILY
-    return family
-
-
-def _added(name: str) -> Sensor:
-    family: Sensor = load_named(SENSORS_GROUP, name, Sensor, SensorError)
-    return family

@@ -95,6 +95,8 @@ class Question:
         The name of the times in quotes, with their range and median step if known; empty if there are no times.
     reason : str
         The reason for the question, if the columns do not show it, for example an answer that does not fit.
+    rows : tuple of tuple of str
+        The names of the first columns and the numbers of the first rows; empty if no table could be chosen.
     """
 
     path: str
@@ -102,6 +104,7 @@ class Question:
     columns: tuple[str, ...] = ()
     times: str = ""
     reason: str = ""
+    rows: tuple[tuple[str, ...], ...] = ()
 
     @property
     def missing(self) -> tuple[Missing, ...]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.analyse import Oscillation, analyse
+from pipeline.analyse import analyse
 from pipeline.errors import PipelineError
 from pipeline.options import options_for
 from pipeline.track import Track
@@ -83,13 +83,12 @@ def evaluate(job: tuple[Case, str, int]) -> Outcome:
         return Outcome(str(error), nothing, nothing)
     except Exception as error:  # count a defect like a refusal, so that the other records are still measured
         return Outcome(f"{type(error).__name__}: {error}", nothing, nothing)
-    motion = analysis.motion
-    if not isinstance(motion, Oscillation):
-        return Outcome(motion.why, nothing, nothing)
+    if (motion := analysis.oscillation) is None:
+        return Outcome(analysis.motion.why, nothing, nothing)
     # Phase and amplitude refer to the first used sample, which is later if the first samples are false echoes.
     start = np.array([motion.damping.t0 - case.origin_s])
     true_phase, true_amplitude = float(truth.phase_at(start)[0]), float(truth.amplitude_at(start)[0])
-    period, phase = motion.derived.statistical["period"], analysis.estimates["phase"]
+    period, phase = analysis.derived.statistical["period"], analysis.estimates["phase"]
     pairs = {
         "frequency": (1 / period.value - 1 / truth.period, period.u / period.value**2),
         "phase": (math.remainder(phase.value - true_phase, 2 * math.pi), phase.u),

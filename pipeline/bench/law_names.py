@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from failure.extensions import entry_points_of
+from failure.extensions import names_in
 
 LAW_NAMES = (
     "none",
@@ -26,4 +26,4 @@ GROUP = "springmass.laws"
 
 def law_names() -> tuple[str, ...]:
     """Return the names of the built-in laws, then those of the laws that other packages add."""
-    return tuple(dict.fromkeys((*LAW_NAMES, *entry_points_of(GROUP))))
+    return names_in(GROUP, LAW_NAMES)

@@ -99,6 +99,20 @@ class Choice(_Field[str, str]):
         return str(given)
 
 
+class TrueOrFalse(_Field[bool | str, bool]):
+    """A statement of a scene that is true or false: its table and key in a scene file."""
+
+    def __init__(self, table: str, key: str) -> None:
+        self.place = (table, key)
+
+    def checked(self, given: Any, where: str) -> bool:
+        """Return whether it is true; a command line gives it as a text."""
+        if (value := {"true": True, "false": False}.get(str(given).lower())) is None:
+            table, key = self.place
+            raise SceneError(f"{where}: [{table}] {key} must be true or false, got {_short(given)}")
+        return value
+
+
 @dataclass(frozen=True, kw_only=True)
 class Scene:
     """The quantities of the bench.
@@ -106,11 +120,13 @@ class Scene:
     Every quantity is an :class:`Estimate`, or None if it is unknown; a plain number in the scene file has ``u`` = 0.
     The attributes ``spring_constant_n_per_m``, ``spring_cubic_n_per_m3``, ``start_*`` and the damping coefficients are
     inputs of a simulation; an analysis measures them instead. ``damping_law`` is the name of the damping law if it is
-    known; an analysis states its results by this law.
+    known; an analysis states its results by this law. ``spring_none`` says that no spring bears the bob, as of a
+    torsion balance, a light spot or a beam.
     """
 
     bob_mass_kg: Stated = Stated("bob", "mass_kg", "kg", 1e-12, 1e6)
     spring_mass_kg: Stated = Stated("spring", "mass_kg", "kg", 0.0, 1e6)
+    spring_none: TrueOrFalse = TrueOrFalse("spring", "none")
     spring_constant_n_per_m: Stated = Stated("spring", "constant_n_per_m", "N/m", 1e-12, 1e12)
     spring_cubic_n_per_m3: Stated = Stated("spring", "cubic_n_per_m3", "N/m3", -1e18, 1e18)
     pendulum_length_m: Stated = Stated("pendulum", "length_m", "m", 1e-4, 1e4)
@@ -157,6 +173,8 @@ class Scene:
                 known[field.attribute] = field.checked(value, where)
         scene = cls(**known)
         _check_vapour(scene, where)
+        if scene.spring_none and len(tables["spring"]) > 1:
+            raise SceneError(f"{where}: [spring] none = true leaves no spring to describe", "leave out its other keys")
         return scene
 
     def to_mapping(self) -> dict[str, dict[str, Any]]:
@@ -180,9 +198,14 @@ class Scene:
         given = (self.sensor_position, self.sensor_mean_samples, self.sensor_lag_s)
         return any(x is not None for x in given)
 
+    @property
+    def hangs_on_spring(self) -> bool:
+        """Whether the bob may hang on a spring: not if the scene says so, or states a pendulum and no spring."""
+        return not self.spring_none and (self.pendulum_length_m is None or self.spring_mass_kg is not None)
+
 
 BENCH_KEYS = {each.place: each for each in vars(Scene).values() if isinstance(each, Stated)}
-_CHOICES = {each.place: each for each in vars(Scene).values() if isinstance(each, Choice)}
+_CHOICES = {each.place: each for each in vars(Scene).values() if isinstance(each, Choice | TrueOrFalse)}
 PLACES = {quantity.attribute: place for place, quantity in BENCH_KEYS.items()}
 """Table and key in a scene file for every quantity, by its attribute."""
 

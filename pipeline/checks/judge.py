@@ -8,34 +8,36 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from pipeline.bench.scene import Scene
 from pipeline.bench.sensor_filter import SensorFilter
+from pipeline.checks.half import half_frequency
 from pipeline.checks.limits import beyond_limits
-from pipeline.checks.model import colour, excess, halves, phases, slow_change
+from pipeline.checks.model import colour, excess, phases, slow_change
 from pipeline.checks.residual import Misfit, Outcome, Residual, residual_of
 from pipeline.checks.rounding import rounding
 from pipeline.checks.sensor import held, held_count, held_numbers, smoothed
 from pipeline.checks.shape import folded_shape
 from pipeline.motion.at_rest import Rest
-from pipeline.motion.fitted import Fitted
-from pipeline.motion.kinds import FittedMotion
+from pipeline.motion.fitted import Oscillation
+from pipeline.motion.kinds import Motion
 from pipeline.notice import Notice
 from pipeline.parts.lost_rows import LostRows
 from pipeline.samples.condition import Samples
 
 # The tests of the residual in order.
 TESTS: tuple[Callable[[Residual], Outcome | None], ...] = (
+    half_frequency,
     folded_shape,
     held,
     smoothed,
     excess,
-    halves,
     colour,
     phases,
 )
 
 
 def judge(
-    samples: Samples, motion: FittedMotion, filter_: SensorFilter | None, lost: LostRows | None = None
+    samples: Samples, motion: Motion, scene: Scene, lost: LostRows | None = None
 ) -> tuple[tuple[Notice, ...], tuple[Misfit, ...]]:
     """Return what the limits and the tests found, and what it adds to the uncertainties.
 
@@ -43,16 +45,16 @@ def judge(
     distorts every period, which would look like a shape. A relaxation and two modes are accepted by such a test of
     their fit. Of a bob at rest only a sensor that holds its readings shows.
     """
-    if not isinstance(motion, Fitted):
+    if not isinstance(motion, Oscillation):
         repeats = held_count(samples) if isinstance(motion, Rest) else 1
         numbers_of_held = held_numbers(repeats, 1.0 / samples.track.rate_hz)
         return ((Notice("held_samples", numbers_of_held),) if repeats > 1 else ()), ()
     fitted = motion
-    outcomes = list(beyond_limits(samples, fitted))
+    outcomes = list(beyond_limits(samples, fitted, spring=scene.hangs_on_spring))
     if lost is not None:
         missing = {"places": lost.places, "share": lost.share}
         outcomes.append(Outcome("lost_rows", missing, Misfit(name="lost_rows", clock=lost.share)))
-    residual = residual_of(samples, fitted, filter_)
+    residual = residual_of(samples, fitted, SensorFilter.of(scene, samples.track.rate_hz))
     for test in (slow_change,) if fitted.method == "equation" else TESTS:
         if (outcome := test(residual)) is not None:
             outcomes.append(outcome)

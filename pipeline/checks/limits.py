@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.bench.spring import GRAVITY_M_PER_S2
 from pipeline.checks.residual import Misfit, Outcome
-from pipeline.motion.fitted import Fitted
+from pipeline.motion.fitted import Oscillation
 from pipeline.numerics.levels import NEGLIGIBLE
 from pipeline.numerics.robust import median
 from pipeline.samples.condition import Samples
@@ -49,8 +49,8 @@ LIMITS = (
 )
 
 
-def beyond_limits(samples: Samples, fitted: Fitted) -> Iterator[Outcome]:
-    """Yield every limit that the motion exceeds.
+def beyond_limits(samples: Samples, fitted: Oscillation, *, spring: bool) -> Iterator[Outcome]:
+    """Yield every limit that the motion exceeds; without a spring only that of its samples per period.
 
     The spring can only pull, so the bob never accelerates downward faster than in free fall: :math:`A\\omega^2 \\le g`,
     and not much more if the spring goes slack. For a recorded acceleration :math:`A\\omega^2` is the amplitude itself.
@@ -60,7 +60,7 @@ def beyond_limits(samples: Samples, fitted: Fitted) -> Iterator[Outcome]:
     """
     numbers = _numbers(samples, fitted)
     reported = set()
-    for limit in LIMITS:
+    for limit in LIMITS if spring else LIMITS[:1]:
         if limit.code in reported or not (numbers[limit.number] < limit.least or numbers[limit.number] > limit.most):
             continue
         reported.add(limit.code)
@@ -68,7 +68,7 @@ def beyond_limits(samples: Samples, fitted: Fitted) -> Iterator[Outcome]:
         yield Outcome(limit.code, {name: numbers[name] for name in limit.shown}, misfit)
 
 
-def _numbers(samples: Samples, fitted: Fitted) -> dict[str, float]:
+def _numbers(samples: Samples, fitted: Oscillation) -> dict[str, float]:
     """Return the numbers by name, NaN where they have no meaning for the record's quantity."""
     track, windows = samples.track, fitted.windows
     used = windows.used

@@ -11,11 +11,11 @@ from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_CURVE, MISFIT, NOTI
 from pipeline.numerics.regression import chi2_quantile, correlation_length
 from pipeline.samples.condition import COARSE
 from pipeline.track import F8
-from pipeline.windows.demodulate import FINEST, ROUNDING
+from pipeline.windows.demodulate import FINEST
 
 # Degree of the polynomials of a slow change: a smooth curve through a run has four parameters and one more.
 SLOW = 4
-ALARM_OF_A_TEST = FALSE_ALARM / 3.0  # probability of a false alarm of each of the three tests that decide by one alone
+ALARM_OF_A_TEST = FALSE_ALARM / 2.0  # probability of a false alarm of each of the two tests that decide by one alone
 
 
 def slow_change(residual: Residual) -> Outcome | None:
@@ -61,29 +61,6 @@ def phases(residual: Residual) -> Outcome | None:
         chi2 = phase.reduced_chi2
         return Outcome("model_misfit", {"phase_chi2": chi2, "phase_scatter": math.sqrt(chi2)})
     return None
-
-
-def halves(residual: Residual) -> Outcome | None:
-    """Test whether both halves of the run agree with one model.
-
-    The residuals of amplitudes and phases, over their standard uncertainties, are fitted by a straight line in each
-    half. If the model is correct, the differences in level and slope are four standard normal numbers, of which the
-    largest is tested.
-    """
-    fitted = residual.fitted
-    windows, damping = fitted.windows, fitted.damping
-    if windows.t.size < 2 * FEWEST_FOR_CURVE:
-        return None
-    amplitudes = (windows.amplitude - damping.best.amplitude(windows.t - damping.t0)) / damping.scatter.u
-    u_phase = np.maximum(np.sqrt(windows.covariance[:, 1, 1]), ROUNDING)
-    half = windows.t.size // 2
-    x = np.arange(half) - 0.5 * (half - 1)
-    apart = 0.0
-    for part in (amplitudes, (windows.phase - fitted.phase.total(windows.t)) / u_phase):
-        change = part[-half:] - part[:half]
-        level, slope = abs(float(change.sum())) / math.sqrt(half), abs(float(x @ change)) / math.sqrt(float(x @ x))
-        apart = max(apart, level / math.sqrt(2.0), slope / math.sqrt(2.0))
-    return Outcome("model_misfit", {"halves": apart}) if apart > normal_quantile(1.0 - ALARM_OF_A_TEST / 4.0) else None
 
 
 def colour(residual: Residual) -> Outcome | None:

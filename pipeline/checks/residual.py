@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.bench.sensor_filter import SensorFilter
-from pipeline.motion.fitted import Fitted
+from pipeline.motion.fitted import Oscillation
 from pipeline.numerics.levels import FEWEST_FOR_LINE
 from pipeline.numerics.robust import median
 from pipeline.samples.condition import COARSE, Samples
@@ -53,7 +53,7 @@ class Residual:
     """The residual at the samples used (k,), and the fit that left it."""
 
     samples: Samples
-    fitted: Fitted
+    fitted: Oscillation
     filter: SensorFilter | None  # of the sensor, as the scene states it
     values: F8  # still with the harmonics that were subtracted as modes
     phase: F8  # of the oscillation, rad
@@ -89,7 +89,7 @@ class Residual:
         return replace(self, values=self.values - outcome.explains, lags=max(self.lags, outcome.lags))
 
 
-def residual_of(samples: Samples, fitted: Fitted, filter_: SensorFilter | None) -> Residual:
+def residual_of(samples: Samples, fitted: Oscillation, filter_: SensorFilter | None) -> Residual:
     """Return the residual of a run that was fitted by its windows."""
     windows, modes, t = fitted.windows, fitted.modes, samples.track.t
     rows = np.flatnonzero(windows.used & np.isfinite(windows.residual))

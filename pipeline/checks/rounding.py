@@ -7,13 +7,13 @@ import math
 import numpy as np
 
 from pipeline.checks.residual import Misfit
-from pipeline.motion.fitted import Fitted
+from pipeline.motion.fitted import Oscillation
 from pipeline.numerics.levels import NEGLIGIBLE
 from pipeline.samples.condition import Samples
 from pipeline.windows.rounding import rounding_errors
 
 
-def rounding(samples: Samples, fitted: Fitted) -> Misfit | None:
+def rounding(samples: Samples, fitted: Oscillation) -> Misfit | None:
     """Return what rounding adds to the uncertainties; None if it is negligible.
 
     The rest position lies at the same place between two steps in all windows, so the errors of their amplitudes are one

@@ -20,7 +20,7 @@ from pipeline.damping.laws import LAWS, Drag, Law, in_units, units_of
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.least_squares import Fit
-from pipeline.numerics.levels import BARE_MENTION, COVERAGE, FALSE_ALARM, NEGLIGIBLE, normal_quantile
+from pipeline.numerics.levels import BARE_MENTION, COVERAGE, FALSE_ALARM, NEGLIGIBLE, STRONG, normal_quantile
 from pipeline.numerics.regression import chi2_quantile, solve_weighted
 from pipeline.track import F8
 
@@ -235,7 +235,7 @@ class LawChoice(NamedTuple):
     idle: tuple[str, ...] = ()
 
 
-def choose(fits: Mapping[str, LawFit], evidence: float, span: Callable[[str], F8]) -> LawChoice:
+def choose(fits: Mapping[str, LawFit], span: Callable[[str], F8]) -> LawChoice:
     """Select a law and list the admissible ones; if all are rejected, the nearest is selected and none is admissible.
 
     A law that contains the selected one as a special case is idle if its BIC is higher by more than 2, and its damping,
@@ -255,7 +255,7 @@ def choose(fits: Mapping[str, LawFit], evidence: float, span: Callable[[str], F8
     selected = min(ties, key=lambda name: (count[name], list(fits).index(name)))
     best = fits[selected]
     order = sorted(allowed, key=lambda name: (name != selected, fits[name].bic))
-    reach = [name for name in order if fits[name].bic - least <= evidence]
+    reach = [name for name in order if fits[name].bic - least <= STRONG]
     idle = {n for n in reach if selected in fits[n].law.cases and fits[n].bic - best.bic > BARE_MENTION}
     if idle:
         most, smallest_amplitude = span(selected)

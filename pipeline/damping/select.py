@@ -12,7 +12,7 @@ from pipeline.damping.law_fit import NEGATIVE, LawChoice, LawFit, choose, fit_la
 from pipeline.damping.laws import LAWS, Drag, Law, find_law, free_power
 from pipeline.errors import AnalysisError
 from pipeline.numerics.least_squares import Fit
-from pipeline.numerics.levels import OUTLIER, STRONG
+from pipeline.numerics.levels import OUTLIER
 from pipeline.numerics.regression import Scatter, chi2_quantile, correlation_length, scatter
 from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8
@@ -85,6 +85,10 @@ class Damping:
         return next(fits, None)
 
 
+NO_LAWS = Damping(math.nan, {}, "", (), Scatter(np.empty(0), 0.0, np.empty(0, np.bool_), 1.0))
+"""The damping of a motion that is no oscillation."""
+
+
 def fit_laws(
     windows: Windows,
     t0: float,
@@ -131,7 +135,7 @@ def select_law(fits: Mapping[str, LawFit], known: str, last_s: float) -> LawChoi
     if known in fits:
         return LawChoice(known, () if fits[known].rejected else (known,))
     ends = np.array([0.0, last_s])
-    return choose(fits, STRONG, lambda name: fits[name].amplitude(ends))
+    return choose(fits, lambda name: fits[name].amplitude(ends))
 
 
 def _curved(damping: Damping) -> bool:

@@ -38,6 +38,7 @@ class FindingKind:
     doubts: tuple[str, ...] = ()
     doubts_above: Mapping[str, float] = field(default_factory=dict)
     about: tuple[str, ...] = ()
+    explains: tuple[str, ...] = ()
     consequence: str | None = None
 
 
@@ -70,7 +71,7 @@ def kinds() -> Mapping[str, FindingKind]:
 
 
 def _field(name: str, value: Any) -> Any:
-    if name in ("severity", "says", "details", "advice", "doubts", "about"):
+    if name in ("severity", "says", "details", "advice", "doubts", "about", "explains"):
         return (value,) if isinstance(value, str) else tuple(value)
     return value
 
@@ -100,8 +101,10 @@ def usual_advice(code: str) -> str:
 
 
 def worded(unit: str, *groups: Iterable[Notice]) -> tuple[Finding, ...]:
-    """Put all that was found into words, the most severe first."""
-    return by_severity(word(found, unit) for group in groups for found in group)
+    """Put all that was found into words, the most severe first, without what another finding explains."""
+    every = [found for group in groups for found in group]
+    explained = {code for found in every for code in kinds()[found.code].explains}
+    return by_severity(word(found, unit) for found in every if found.code not in explained)
 
 
 def by_severity(findings: Iterable[Finding]) -> tuple[Finding, ...]:

@@ -13,19 +13,20 @@ from pipeline.damping.laws import words_of
 from pipeline.damping.select import Damping
 from pipeline.motion.at_rest import Rest
 from pipeline.motion.by_samples import FEW_WINDOWS
-from pipeline.motion.fitted import Fitted, RestPosition
-from pipeline.motion.kinds import FittedMotion
+from pipeline.motion.fitted import Oscillation, RestPosition
+from pipeline.motion.kinds import Motion
+from pipeline.motion.lines import Apart, find_several
 from pipeline.motion.relaxation import Relaxation
 from pipeline.motion.two_modes import TwoModes
 from pipeline.notice import Notice
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.levels import NOTICEABLE, VERY_STRONG
+from pipeline.samples.condition import Samples
 from pipeline.units import amount, number
-from pipeline.windows.cycles import Cycles
 from pipeline.windows.demodulate import model_error
 
 
-def kind_findings(motion: FittedMotion, estimates: Mapping[str, Estimate]) -> Iterator[Notice]:
+def kind_findings(motion: Motion, estimates: Mapping[str, Estimate]) -> Iterator[Notice]:
     """Yield what kind of motion a recording shows, if it is not an oscillation of many cycles."""
     if isinstance(motion, Relaxation) and motion.kind == "strong":
         yield Notice("strongly_damped", {"damping_ratio": motion.damping_ratio.value, "why": motion.why})
@@ -39,7 +40,24 @@ def kind_findings(motion: FittedMotion, estimates: Mapping[str, Estimate]) -> It
         yield Notice("no_oscillation", {"why": motion.why})
 
 
-def fit_findings(fitted: Fitted) -> Iterator[Notice]:
+def apart_finding(line: Apart) -> Notice:
+    """Return what a line is that was subtracted before the fit."""
+    numbers = {"amplitude_m": line.amplitude, "frequency_hz": line.frequency_hz}
+    if line.cause == "overtone":
+        return Notice("overtone", numbers)
+    return Notice("driven", {**numbers, "cause": "mains hum" if line.cause == "mains" else "a drive"})
+
+
+def several_findings(samples: Samples, motion: Oscillation, notices: tuple[Notice, ...]) -> Iterator[Notice]:
+    """Yield the lines that describe a recording, if one oscillation does not."""
+    if motion.damping.admissible and all(found.code != "model_misfit" for found in notices):
+        return
+    lines = find_several(samples)
+    if lines is not None and lines.are_several() and lines.leaves_noise(samples):
+        yield Notice("several_lines", {"lines": len(lines.sizes), "listed": lines.listed(samples.track.unit)})
+
+
+def fit_findings(fitted: Oscillation) -> Iterator[Notice]:
     """Yield what the fits of the samples came to."""
     if fitted.method == "equation":
         yield Notice("strongly_damped", {"why": fitted.why})
@@ -49,12 +67,12 @@ def fit_findings(fitted: Fitted) -> Iterator[Notice]:
         yield Notice("not_converged", {fitted.refused.code: "", **fitted.refused.numbers})
 
 
-def motion_findings(cycles: Cycles, fitted: Fitted) -> Iterator[Notice]:
+def motion_findings(fitted: Oscillation) -> Iterator[Notice]:
     """Yield what the fit of an oscillation shows of its motion."""
     windows, phase, rest = fitted.windows, fitted.phase, fitted.rest
     count, omega = windows.t.size, phase.angular_frequency.value
     if count < FEW_WINDOWS:
-        yield Notice("short_record", {"periods": cycles.count, "windows": count})
+        yield Notice("short_record", {"periods": windows.cycles.count, "windows": count})
     if windows.lost:
         lost = {"periods": windows.lost, "all_periods": windows.lost + count}
         yield Notice("missing_samples", lost, "warning")
@@ -82,7 +100,7 @@ def _rest_drift(rest: RestPosition, u_rate: float) -> Notice:
     return Notice("rest_drift", numbers)
 
 
-def _modes(fitted: Fitted, unit: str) -> Iterator[Notice]:
+def _modes(fitted: Oscillation, unit: str) -> Iterator[Notice]:
     modes, main = fitted.modes, fitted.phase.angular_frequency.value / (2.0 * math.pi)
     own = [mode for mode in modes.members if mode.kind == "mode"]
     if not own:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -153,6 +153,11 @@ class Modes:
         for mode, wave in self._waves(t):
             total += (mode.envelope(t) * wave).real
         return total
+
+    def independent(self, t: F8) -> F8 | float:
+        """Return what the independent modes contributed at t (n,), m, if they were subtracted; 0 otherwise."""
+        own = tuple(mode for mode in self.members if mode.kind == "mode")
+        return 0.0 if self.subtracted is None else replace(self, members=own).position(t)
 
     def _waves(self, t: F8) -> Iterator[tuple[Mode, C16]]:
         if self.carrier is None or not self.members:

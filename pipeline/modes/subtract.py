@@ -11,11 +11,10 @@ from pipeline.modes.mode import Modes
 from pipeline.modes.search import find_modes
 from pipeline.numerics.levels import NEGLIGIBLE
 from pipeline.samples.condition import Samples
-from pipeline.windows.cycles import Cycles
 from pipeline.windows.demodulate import Windows, demodulate
 
 
-def separate(samples: Samples, cycles: Cycles, windows: Windows, *, sought: bool = True) -> tuple[Windows, Modes]:
+def separate(samples: Samples, windows: Windows, *, sought: bool = True) -> tuple[Windows, Modes]:
     """Search for modes, and demodulate again without them.
 
     A mode of amplitude B at a distance :math:`\\Delta f` from the main frequency leaves up to
@@ -31,7 +30,7 @@ def separate(samples: Samples, cycles: Cycles, windows: Windows, *, sought: bool
             # Windows fitted without the modes separate false echoes from the main oscillation better.
             modes = cleaner
         subtracted = modes.position(samples.track.t)
-        windows = demodulate(samples.less(subtracted), cycles)
+        windows = demodulate(samples.less(subtracted), windows.cycles)
     return windows, replace(modes, samples=samples.less(subtracted), subtracted=subtracted, leak=leak)
 
 

@@ -18,7 +18,7 @@ from pipeline.damping.law_fit import LawFit
 from pipeline.damping.laws import Law
 from pipeline.damping.select import Damping
 from pipeline.modes.mode import Modes
-from pipeline.motion.fitted import Fitted, Method, Phase, RestPosition, TimeTable, Waveform, delay, wrapped
+from pipeline.motion.fitted import Method, Oscillation, Phase, RestPosition, TimeTable, Waveform, delay, wrapped
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_LINE, VERY_STRONG
 from pipeline.numerics.regression import (
@@ -89,7 +89,7 @@ class Averaged:
         return amplitude * cosine + rest @ still, slopes
 
 
-def fit_windows(windows: Windows, modes: Modes, damping: Damping) -> Fitted:
+def fit_windows(windows: Windows, modes: Modes, damping: Damping) -> Oscillation:
     """Fit phase and rest position to the windows, whose amplitudes gave the laws."""
     samples = modes.samples
     track = samples.track
@@ -101,7 +101,7 @@ def fit_windows(windows: Windows, modes: Modes, damping: Damping) -> Fitted:
 
 def assembled(
     windows: Windows, modes: Modes, damping: Damping, phase: Phase, rest: RestPosition, method: Method
-) -> Fitted:
+) -> Oscillation:
     """Return the fitted oscillation with its waveform: rest position, amplitude and phase at every sample."""
     track = modes.samples.track
     used = windows.used
@@ -117,7 +117,7 @@ def assembled(
     rms = math.sqrt(float(left @ left) / left.size)
     whole = position if modes.subtracted is None else position + modes.subtracted
     waveform = Waveform(whole, partial(_velocity, best, phase, amplitude, angle), residual, rms)
-    return Fitted(
+    return Oscillation(
         windows=windows,
         modes=modes,
         damping=damping,
@@ -184,6 +184,7 @@ def fit_phase(windows: Windows, damping: Damping, last: float) -> Phase:
         area=area,
         lag=lag,
         small_swings=small,
+        spread=spread,
     )
 
 
@@ -270,10 +271,10 @@ def fit_rest(windows: Windows, unit: str) -> RestPosition:
     widened = max(spread.correlation, correlation_length(left)) * max(1.0, float(left @ left) / max(left.size - 1, 1))
     estimate = Estimate(mean, math.sqrt(widened / float(weight @ weight)), unit)
     curve = np.asarray(polynomial(t), np.float64)
-    return RestPosition(estimate, float(np.ptp(curve)), gain > VERY_STRONG, t, curve)
+    return RestPosition(estimate, float(np.ptp(curve)), gain > VERY_STRONG, t, curve, spread)
 
 
-def check_coherence(fitted: Fitted, typical: float) -> NoOscillation | None:
+def check_coherence(fitted: Oscillation, typical: float) -> NoOscillation | None:
     """Return why a motion is no oscillation, although single periods look like one; None if it is one.
 
     Amplitude and phase of a window form a phasor. Weighted by length, half of the phasors must differ from what the fit
@@ -286,7 +287,7 @@ def check_coherence(fitted: Fitted, typical: float) -> NoOscillation | None:
     )
 
 
-def typical_miss(fitted: Fitted) -> float:
+def typical_miss(fitted: Oscillation) -> float:
     """Return the median difference of windows from the fitted oscillation, over their amplitudes, weighted by these."""
     windows, phase = fitted.windows, fitted.phase
     expected = fitted.damping.best.amplitude(windows.t - phase.t0) * np.exp(1j * phase.total(windows.t))

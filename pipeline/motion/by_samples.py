@@ -13,7 +13,7 @@ from pipeline.damping.laws import LAWS, Law
 from pipeline.damping.select import Damping
 from pipeline.motion.averaged import Averaged, area_of, assembled
 from pipeline.motion.fit import Rows, clipped, covariance_of, fit
-from pipeline.motion.fitted import Fitted, Phase, RestPosition, wrapped
+from pipeline.motion.fitted import Oscillation, Phase, RestPosition, wrapped
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import Fit
 from pipeline.numerics.levels import BARE_MENTION, ROUNDS, STRONG
@@ -35,7 +35,7 @@ class _OfLaw:
     dof: float
 
 
-def fit_samples(fitted: Fitted, samples: Samples) -> Fitted:
+def fit_samples(fitted: Oscillation, samples: Samples) -> Oscillation:
     """Fit rest position, damping law and phase to all samples together.
 
     ``samples`` include the other modes. Their columns are projected out, so that the record without them gives the
@@ -121,7 +121,7 @@ def _short(windows: Windows, damping: Damping) -> tuple[dict[str, Law], dict[str
     return {name: LAWS[name] for name in thetas}, thetas
 
 
-def _rows(fitted: Fitted, samples: Samples, level: float) -> Rows:
+def _rows(fitted: Oscillation, samples: Samples, level: float) -> Rows:
     """Return the samples about a level, of which those in clusters of false echoes may not return."""
     free, flags = fitted.modes.samples, fitted.windows.flags
     track = free.track

@@ -24,7 +24,7 @@ from pipeline.dynamics.integrator import Trajectory
 from pipeline.dynamics.strang import STRANG
 from pipeline.modes.mode import Modes
 from pipeline.motion.fit import Rows, clipped, fit
-from pipeline.motion.fitted import Fitted, Phase, Refused, RestPosition, Waveform, wrapped
+from pipeline.motion.fitted import Oscillation, Phase, Refused, RestPosition, Waveform, wrapped
 from pipeline.motion.relaxation import LEAST_DAMPING
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import CENTRAL_STEP, Fit, central_differences
@@ -189,7 +189,9 @@ class Solved:
 LONGEST_SOLVED = 250
 
 
-def fit_equation(samples: Samples, windows: Windows, damping: Damping, *, stopped: bool) -> Fitted | Refused | None:
+def fit_equation(
+    samples: Samples, windows: Windows, damping: Damping, *, stopped: bool
+) -> Oscillation | Refused | None:
     """Fit the equation of motion if the damping requires it, or refuse it.
 
     The result is None if damping is weak, if no law with damping can be fitted, or if linear drag or no damping is
@@ -404,7 +406,7 @@ def _by_envelope(model: Solved, own: Fit) -> Fit:
 
 def _described(
     samples: Samples, windows: Windows, damping: Damping, model: Solved, rows: Rows, own: Fit
-) -> Fitted | Refused:
+) -> Oscillation | Refused:
     """Return the oscillation by the solution, unless its drag leaves none.
 
     Its squared frequency is :math:`\\omega_0^2` minus the mean decrease by drag over the whole time: to second order,
@@ -453,7 +455,7 @@ def _described(
     # The rest position is the constant one of the record; the place where friction holds the bob may differ.
     rest = RestPosition(Estimate(still, float(u[0]), unit), 0.0, False, t, np.full(t.size, still))
     waveform = Waveform(position, partial(np.asarray, model.motion.velocity(rows.t, theta)), residual, rms)
-    return Fitted(
+    return Oscillation(
         windows=windows,
         modes=Modes(samples),
         damping=damping,

@@ -14,6 +14,7 @@ from pipeline.damping.select import Damping
 from pipeline.modes.mode import Modes
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.levels import NOTICEABLE
+from pipeline.numerics.regression import Scatter
 from pipeline.track import F8, U8
 from pipeline.windows.demodulate import Windows
 
@@ -35,7 +36,9 @@ class Phase:
     middle: float  # weighted mean time, s
     area: TimeTable | None = None  # integral of A^2 from the middle; with a backbone
     lag: TimeTable | None = None  # delay of a period's sinusoid, rad; None if it is constant
-    small_swings: Estimate | None = None  # angular frequency of very small swings; with a backbone
+    small_swings: Estimate | None = None  # angular frequency of very small swings; with a backbone or of a pendulum
+    of_pendulum: bool = False  # whether these follow from the law of a pendulum
+    spread: Scatter | None = None  # of the windows' phases about a smooth curve; None of a single window
     squared_rate: float | None = None  # decrease of the squared frequency by drag, 1/s^2; None: that of the windows
 
     def total(self, t: F8) -> F8:
@@ -45,6 +48,13 @@ class Phase:
         if self.area is not None:
             total += bend[0] * np.interp(t, *self.area)
         return np.asarray(total - delay(t, self.lag))
+
+    def columns(self, t: F8) -> F8:
+        """Return the derivatives (n, p) of :meth:`total` by the coefficients."""
+        columns = [np.ones(t.size), t - self.middle]
+        if self.area is not None:
+            columns.append(np.interp(t, *self.area))
+        return np.stack(columns, axis=1)
 
     def rate(self, amplitude: F8) -> F8:
         """Return the angular frequency in rad/s at amplitudes (n,)."""
@@ -61,6 +71,7 @@ class RestPosition:
     drifts: bool  # whether the curve fits much better than a constant
     t: F8  # (w,) centres of the windows, s
     curve: F8  # (w,) m
+    spread: Scatter | None = None  # of the windows' rest positions about a smooth curve
 
     def at(self, t: F8) -> F8:
         """Return the rest position in m at times t (n,)."""
@@ -99,7 +110,7 @@ Method = Literal["windows", "samples", "equation"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Fitted:
+class Oscillation:
     """An oscillation in the form that the stages after the fit use."""
 
     windows: Windows  # the windows, with the final flags

@@ -11,9 +11,10 @@ from pipeline.motion.at_rest import Rest, rest_of
 from pipeline.motion.averaged import check_coherence, fit_windows, typical_miss
 from pipeline.motion.by_samples import FEW_WINDOWS, fit_samples
 from pipeline.motion.equation import fit_equation
-from pipeline.motion.fitted import Fitted, Refused
+from pipeline.motion.fitted import Oscillation, Refused
+from pipeline.motion.lines import WEAKER, find_several
 from pipeline.motion.relaxation import LEAST_DAMPING, Relaxation, find_relaxation
-from pipeline.motion.two_modes import WEAKER, TwoModes, find_two_modes
+from pipeline.motion.two_modes import TwoModes, find_two_modes
 from pipeline.numerics.levels import VERY_STRONG
 from pipeline.options import Options
 from pipeline.parts.part import Part, check_sinusoid, start_of
@@ -22,26 +23,25 @@ from pipeline.windows.cycles import NoOscillation
 from pipeline.windows.demodulate import Windows
 from pipeline.windows.rounding import rounded
 
-FittedMotion = Fitted | Relaxation | TwoModes | Rest
+Motion = Oscillation | Relaxation | TwoModes | Rest
 
 
-def fit_motion(part: Part, options: Options) -> FittedMotion:
+def fit_motion(part: Part, options: Options) -> Motion:
     """Return the motion of a part: an oscillation, a relaxation, two modes of similar strength, or none.
 
     For strong damping, or friction that stops the bob, the equation of motion is fitted, not its cycle average.
     """
-    samples, windows, cycles = part.samples, part.windows, part.cycles
-    if isinstance(cycles, NoOscillation):
-        return _without_cycles(samples, cycles)
-    assert windows is not None
+    samples, windows = part.samples, part.windows
+    if isinstance(windows, NoOscillation):
+        return _without_cycles(samples, windows)
     if (bent := check_sinusoid(samples, windows)) is not None:
         return _without_cycles(samples, bent)
-    windows, modes = separate(samples, cycles, windows, sought=options.modes)
+    windows, modes = separate(samples, windows, sought=options.modes)
     windows = rounded(windows, samples.quantum)
     start_s, coarse = start_of(samples, windows.angular_frequency), (samples.quantum or 0.0) > COARSE * windows.noise
     laws = fit_laws(windows, start_s, options.laws, options.known_law, samples.track.unit, coarse=coarse)
     solved = fit_equation(samples, windows, laws, stopped=part.stopped)
-    fitted = solved if isinstance(solved, Fitted) else _averaged(windows, modes, laws, samples, options)
+    fitted = solved if isinstance(solved, Oscillation) else _averaged(windows, modes, laws, samples, options)
     if isinstance(solved, Refused):
         fitted = replace(fitted, refused=solved)
     if _may_relax(fitted, laws) and isinstance(relaxed := find_relaxation(samples), Relaxation):
@@ -50,7 +50,11 @@ def fit_motion(part: Part, options: Options) -> FittedMotion:
     incoherent = check_coherence(fitted, missed)
     if (incoherent or missed > WEAKER) and (two := find_two_modes(samples)) is not None:
         return two
-    return fitted if incoherent is None else rest_of(samples, incoherent.why)
+    if incoherent is None:
+        return fitted
+    lines = find_several(samples)
+    listed = "" if lines is None else f"; the strongest lines are {lines.listed(samples.track.unit)}"
+    return rest_of(samples, f"{incoherent.why}{listed}")
 
 
 def _without_cycles(samples: Samples, why: NoOscillation) -> Relaxation | TwoModes | Rest:
@@ -60,13 +64,13 @@ def _without_cycles(samples: Samples, why: NoOscillation) -> Relaxation | TwoMod
     return find_two_modes(samples) or rest_of(samples, (relaxed or why).why)
 
 
-def _averaged(windows: Windows, modes: Modes, laws: Damping, samples: Samples, options: Options) -> Fitted:
+def _averaged(windows: Windows, modes: Modes, laws: Damping, samples: Samples, options: Options) -> Oscillation:
     fitted = fit_windows(windows, modes, laws)
     by_samples = options.rows == "samples" or windows.t.size < FEW_WINDOWS
     return fit_samples(fitted, samples) if by_samples else fitted
 
 
-def _may_relax(fitted: Fitted, laws: Damping) -> bool:
+def _may_relax(fitted: Oscillation, laws: Damping) -> bool:
     """Return whether the damping is strong and, as far as the equation of motion shows, linear.
 
     Linear drag, the simpler law, stands unless another one is better by very strong evidence after its price.

@@ -78,11 +78,30 @@ class Estimate(UFloat):  # type: ignore[misc]
         """The number without its unit, for a package that has units of its own: ``Quantity(x.ufloat, x.unit)``."""
         return UFloat.__pos__(self)
 
+    def written(self, *, brackets: bool = False) -> str:
+        """Write the number without its unit: u to two digits, after +- or in units of the last digit in brackets.
+
+        >>> Estimate(0.752857, 0.001429).written(), Estimate(13.98, 0.0).written(), Estimate(1.5e-7, 2e-9).written()
+        ('0.7529 +- 0.0014', '13.98', '(1.500 +- 0.020)e-07')
+        >>> Estimate(0.752857, 0.001429).written(brackets=True), Estimate(12.3, 1.4).written(brackets=True)
+        ('0.7529(14)', '12.3(1.4)')
+        """
+        value, u = self.value, self.u
+        if math.isfinite(value) and u <= 0.0:
+            return f"{value:.6g}"
+        if not (abs(value) < 1e250 and 1e-250 < u < 1e250):
+            return f"{value:g} +- {u:g}"
+        return f"{ufloat(value, u):{'.2uS' if brackets else '.2u'}}".replace("+/-", " +- ")
+
     def __str__(self) -> str:
-        return format_value(self.value, self.u, self.unit or "")
+        return self.written() + self._tail
 
     def __repr__(self) -> str:
-        return in_brackets(self.value, self.u, self.unit or "")
+        return self.written(brackets=True) + self._tail
+
+    @property
+    def _tail(self) -> str:
+        return f" {self.unit}" if self.unit not in (None, "", "1") else ""
 
     def __format__(self, form: str) -> str:
         return str(super().__format__(form)) if form else str(self)
@@ -199,25 +218,22 @@ class UpperLimit(Estimate):
 
         return self.value + self.u * float(ndtri(1.0 - (1.0 - LIMIT) * ndtr(self.value / self.u)))
 
-    def __str__(self) -> str:
-        return f"< {format_limit(self.limit)} {self.unit}".rstrip() + f" ({100.0 * LIMIT:g} %)"
+    def written(self, *, brackets: bool = False) -> str:  # noqa: ARG002  # a limit shows no u
+        """Write the limit to two significant digits, rounded up.
 
-    def __repr__(self) -> str:
-        return str(self)
+        >>> UpperLimit(0.0, 1e-6).written(), UpperLimit(0.019, 0.095).written(brackets=True)
+        ('< 2.0e-06', '< 0.20')
+        """
+        limit = self.limit
+        step = 10.0 ** (math.floor(math.log10(limit)) - 1)
+        rounded = math.ceil(limit / step - 1e-9) * step
+        if not 1e-4 <= rounded < 1e6:
+            return f"< {rounded:.1e}"
+        return f"< {rounded:.{max(0, 1 - math.floor(math.log10(rounded) + 1e-9))}f}"
 
-
-def format_limit(limit: float) -> str:
-    """Write a positive upper limit to two significant digits, rounded up.
-
-    >>> format_limit(0.1991), format_limit(1.21e-6)
-    ('0.20', '1.3e-06')
-    """
-    exponent = math.floor(math.log10(limit))
-    step = 10.0 ** (exponent - 1)
-    rounded = math.ceil(limit / step - 1e-9) * step
-    if not 1e-4 <= rounded < 1e6:
-        return f"{rounded:.1e}"
-    return f"{rounded:.{max(0, 1 - math.floor(math.log10(rounded) + 1e-9))}f}"
+    @property
+    def _tail(self) -> str:
+        return f"{super()._tail} ({100.0 * LIMIT:g} %)"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -246,30 +262,3 @@ class Joint:
         found = self.covariance / np.outer(scale, scale)
         np.fill_diagonal(found, 1.0)
         return np.asarray(np.clip(found, -1.0, 1.0))
-
-
-def format_value(value: float, u: float, unit: str = "") -> str:
-    """Write u to two significant digits and the value to the same decimal place.
-
-    >>> format_value(0.752857, 0.001429, "s"), format_value(13.98, 0.0, "N/m"), format_value(1.5e-7, 2.0e-9, "m")
-    ('0.7529 +- 0.0014 s', '13.98 N/m', '(1.500 +- 0.020)e-07 m')
-    """
-    return _written(value, u, ".2u", unit)
-
-
-def in_brackets(value: float, u: float, unit: str = "") -> str:
-    """Write the uncertainty in brackets, in units of the value's last digit.
-
-    >>> in_brackets(0.752857, 0.001429, "s"), in_brackets(12.3, 1.4), in_brackets(1.5e-7, 2.0e-9, "m")
-    ('0.7529(14) s', '12.3(1.4)', '1.500(20)e-07 m')
-    """
-    return _written(value, u, ".2uS", unit)
-
-
-def _written(value: float, u: float, form: str, unit: str) -> str:
-    tail = f" {unit}" if unit not in ("", "1") else ""
-    if math.isfinite(value) and u <= 0.0:
-        return f"{value:.6g}{tail}"
-    if not (abs(value) < 1e250 and 1e-250 < u < 1e250):
-        return f"{value:g} +- {u:g}{tail}"
-    return f"{ufloat(value, u):{form}}{tail}".replace("+/-", " +- ")

@@ -16,7 +16,6 @@ from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_MEDIAN, OUTLIER, RO
 from pipeline.numerics.robust import mad_sigma
 from pipeline.samples.condition import Clipping, Samples
 from pipeline.track import F8, Bools, Quality
-from pipeline.windows.cycles import Cycles
 from pipeline.windows.demodulate import ROUNDING, Windows
 from pipeline.windows.sinusoids import WindowSamples, refit, solve
 
@@ -62,7 +61,7 @@ class _End:
     windows: int
 
 
-def find_clipping(samples: Samples, cycles: Cycles, windows: Windows) -> Samples | None:
+def find_clipping(samples: Samples, windows: Windows) -> Samples | None:
     """Return the record with every clipped crest flagged, or None if none shows beyond those flagged already.
 
     Every window's sinusoid is fitted to the middle of its swing. Let :math:`z_j` be the shortfall of the median of
@@ -79,13 +78,13 @@ def find_clipping(samples: Samples, cycles: Cycles, windows: Windows) -> Samples
     # A record whose crests are flat may show no noise at all.
     rounding = ROUNDING * float(np.max(np.abs(windows.amplitude)))
     least_noise = max(samples.noise_of_reading, rounding)
-    unexplained = _of_windows(WindowSamples.sliced(samples, cycles.bounds), windows)
+    unexplained = _of_windows(WindowSamples.sliced(samples, windows.cycles.bounds), windows)
     if not any(_clipped_windows(unexplained, sign, least_noise) for sign in (1.0, -1.0)):
         return None
     flags = samples.flags.copy()
-    seen = slice(int(cycles.bounds[0]), int(cycles.bounds[-1]))
+    seen = slice(int(windows.cycles.bounds[0]), int(windows.cycles.bounds[-1]))
     flags[seen] = flags[seen] & ~np.uint8(Quality.CLIPPED) | samples.track.flags[seen]
-    slices = WindowSamples.sliced(replace(samples, flags=flags), cycles.bounds)
+    slices = WindowSamples.sliced(replace(samples, flags=flags), windows.cycles.bounds)
     least = max(least_noise, slices.tiny)
     whole = _of_windows(slices, windows)
     decay = np.interp(slices.centre, windows.t, windows.decay)

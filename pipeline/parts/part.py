@@ -40,8 +40,7 @@ class Part:
 
     samples: Samples
     partition: Partition | None
-    cycles: Cycles | NoOscillation
-    windows: Windows | None = None  # None without cycles
+    windows: Windows | NoOscillation
     stopped: bool = False
     lost: LostRows | None = None
 
@@ -99,22 +98,22 @@ def _free_part(samples: Samples) -> Part | NoOscillation:
         if outside is None:
             break
         # Windows of equal length are no whole periods of a wide pendulum, which would look like handling.
-        if (followed := follow(cycles, windows, samples.track.t)) is not cycles:
+        if (followed := follow(windows, samples.track.t)) is not windows.cycles:
             along = demodulate(samples, followed)
             if free_span(samples, along) is None:
-                cycles, windows = followed, along
+                windows = along
                 break
         shorter = condition(outside.flagged(samples.track))
         trimmed, stops = _cycles(shorter)
         if isinstance(trimmed, NoOscillation):
             break
-        samples, partition, cycles, stopped = shorter, outside.within(partition), trimmed, stops
-        windows = demodulate(samples, cycles)
-    if (followed := follow(cycles, windows, samples.track.t)) is not cycles:
-        cycles, windows = followed, demodulate(samples, followed)
-    if (clipped := find_clipping(samples, cycles, windows)) is not None:
-        samples, windows = clipped, demodulate(clipped, cycles)
-    return Part(samples, partition, cycles, windows, stopped, lost)
+        samples, partition, stopped = shorter, outside.within(partition), stops
+        windows = demodulate(samples, trimmed)
+    if (followed := follow(windows, samples.track.t)) is not windows.cycles:
+        windows = demodulate(samples, followed)
+    if (clipped := find_clipping(samples, windows)) is not None:
+        samples, windows = clipped, demodulate(clipped, windows.cycles)
+    return Part(samples, partition, windows, stopped, lost)
 
 
 def _long_after_stop(samples: Samples) -> Partition | None:

@@ -95,14 +95,14 @@ class Inputs:
         self._single[name] = estimate
         return ufloat(estimate.value, estimate.u, name) if estimate.u > 0 else estimate.value
 
-    def add_joint(self, name: str, joint: Joint, kind: Evaluation, dof: float = math.inf) -> list[Any]:
-        """Return jointly estimated parameters as correlated variables, which are one line in every budget."""
+    def add_joint(self, name: str, joint: Joint, dof: float = math.inf) -> list[Any]:
+        """Return what a fit of the record gives together as correlated variables, one line in every budget."""
         from uncertainties import correlated_values
 
-        self._register(name, kind, dof)
+        self._register(name, "A", dof)
         return list(correlated_values(joint.values.tolist(), joint.covariance, [name] * joint.values.size))
 
-    def add_alternatives(self, name: str, weights: Mapping[str, float], kind: Evaluation) -> dict[str, Any]:
+    def add_alternatives(self, name: str, weights: Mapping[str, float]) -> dict[str, Any]:
         """Return a variable z_i of mean 0 and variance w_i for each alternative; they are one line in every budget.
 
         If a result x would be x_i under the alternative i, it is written as x + sum_i (x_i - x) z_i. Its variance then
@@ -110,7 +110,7 @@ class Inputs:
         """
         from uncertainties import ufloat
 
-        self._register(name, kind)
+        self._register(name, "B")
         return {key: ufloat(0.0, math.sqrt(w), name) if w > 0 else 0.0 for key, w in weights.items()}
 
     def budget(self, quantity: str, x: Any, unit: str) -> Budget:

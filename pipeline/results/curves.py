@@ -18,7 +18,7 @@ from pipeline.damping.average import Weighted
 from pipeline.damping.law_fit import LawFit
 from pipeline.damping.laws.drag import COEFFICIENTS
 from pipeline.damping.select import Damping
-from pipeline.motion.fitted import Fitted, Phase
+from pipeline.motion.fitted import Oscillation, Phase
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.levels import FEWEST_FOR_LINE, MISFIT
 from pipeline.numerics.regression import solve_weighted
@@ -142,7 +142,7 @@ class Smoothed:
     u_acceleration: F8
 
 
-def kinematics(track: Track, fitted: Fitted, laws: Sequence[Weighted]) -> Smoothed:
+def kinematics(track: Track, fitted: Oscillation, laws: Sequence[Weighted]) -> Smoothed:
     """Return the motion at every sample; NaN at samples without a time and outside the part that was analysed.
 
     Where the fit does not describe the record, amplitude and phase are those of the windows. The uncertainties exclude
@@ -201,7 +201,7 @@ def _u_phase(phase: Phase, t: F8) -> F8:
     return np.hypot(middle, slope * (t - phase.middle))
 
 
-def _by_equation(fitted: Fitted, x: F8, v: F8) -> F8:
+def _by_equation(fitted: Oscillation, x: F8, v: F8) -> F8:
     """Return the acceleration by the fitted equation of motion; 0 where friction holds the bob."""
     found, phase = fitted.damping.best.joint.estimates(), fitted.phase
     mu, gamma, beta = (found[name].value if name in found else 0.0 for name in COEFFICIENTS)

@@ -23,8 +23,8 @@ from pipeline.damping.laws.drag import COEFFICIENTS
 from pipeline.damping.local import local_decay
 from pipeline.damping.select import Damping
 from pipeline.motion.at_rest import Rest
-from pipeline.motion.fitted import Fitted, Phase
-from pipeline.motion.kinds import FittedMotion
+from pipeline.motion.fitted import Oscillation, Phase
+from pipeline.motion.kinds import Motion
 from pipeline.motion.relaxation import Relaxation
 from pipeline.motion.two_modes import TwoModes
 from pipeline.numerics.estimate import Estimate, Joint, UpperLimit
@@ -34,7 +34,6 @@ from pipeline.quantities import QUANTITIES
 from pipeline.results.ambient import Ambient
 from pipeline.results.budget import Budget, Inputs, function_of, joint_of
 from pipeline.results.closed_form import closed_form
-from pipeline.results.curves import Curve, drag_curve, energy_curve
 from pipeline.results.effects import Effect
 from pipeline.results.formulas import solve
 from pipeline.track import F8, UNUSABLE, Quality, Track
@@ -110,20 +109,9 @@ class Derived:
         """Factor from amplitudes of the record to those of the motion, before the filter of a sensor."""
         return Estimate.of_variable(self.scales[1], "").value
 
-    def energy_curve(self, damping: Damping, windows: Windows) -> Curve | None:
-        """Return the mechanical energy against time with its band, in J, or in J/kg if no mass is known."""
-        if self.half_stiffness is None:
-            return None
-        unit = "J/kg" if self.effective_mass_kg is None else "J"
-        return energy_curve(damping, windows, self.half_stiffness, self.laws, unit)
-
-    def drag_curve(self, damping: Damping, windows: Windows) -> Curve | None:
-        """Return the drag coefficient against amplitude with its band."""
-        return None if self.drag_length is None else drag_curve(damping, windows, self.drag_length, self.laws)
-
 
 def derive(
-    track: Track, motion: FittedMotion, scene: Scene, effects: tuple[Effect, ...], misfits: tuple[Misfit, ...]
+    track: Track, motion: Motion, scene: Scene, effects: tuple[Effect, ...], misfits: tuple[Misfit, ...]
 ) -> Derived:
     """Calculate the results of a run by :mod:`pipeline.results.formulas`, and propagate their uncertainties.
 
@@ -139,7 +127,7 @@ def derive(
     :math:`x = \\sum_i w_i x_i` and :math:`u^2 = \\sum_i w_i (u_i^2 + (x_i - x)^2)`.
     """
     inputs, unit = Inputs(), track.unit
-    if not isinstance(motion, Fitted):
+    if not isinstance(motion, Oscillation):
         return _closed(track, motion, scene, inputs)
     fitted = motion
     laws = _Laws(fitted.damping, inputs, fitted.windows)
@@ -170,7 +158,7 @@ def _closed(track: Track, motion: Relaxation | TwoModes | Rest, scene: Scene, in
     instrument, unit = Instrument.of(track), track.unit
     of_scene = _of_scene(track, scene, {"added_mass", "spring_mass"}, inputs)
     rate, scale = inputs.add("clock_rate", instrument.clock_rate, "B"), of_scene["distance_scale"]
-    x = dict(zip(motion.joint.names, inputs.add_joint("fitted_motion", motion.joint, "A", motion.dof), strict=True))
+    x = dict(zip(motion.joint.names, inputs.add_joint("fitted_motion", motion.joint, motion.dof), strict=True))
     known = {
         "time_factor": rate,
         "rest_position": x["rest"],
@@ -225,7 +213,7 @@ _LENGTHS = ("m", "m/s", "m/s^2")  # units in which a displacement, or a derivati
 
 
 def _of_motion(
-    track: Track, fitted: Fitted, misfits: tuple[Misfit, ...], laws: _Laws, inputs: Inputs
+    track: Track, fitted: Oscillation, misfits: tuple[Misfit, ...], laws: _Laws, inputs: Inputs
 ) -> dict[str, Any]:
     """Return the inputs of the formulas that the recording and its fit give; None for what they do not determine."""
     windows, damping, phase, rest = fitted.windows, fitted.damping, fitted.phase, fitted.rest
@@ -264,6 +252,7 @@ def _of_motion(
         "order": {"m": 0, "rad": 0, "m/s": 1, "rad/s": 1, "m/s^2": 2}.get(unit),
         "of_length": unit in _LENGTHS or None,
         "of_angle": unit in ("rad", "rad/s") or None,
+        "of_pendulum": phase.of_pendulum or unit in ("rad", "rad/s") or None,
     }
 
 
@@ -288,7 +277,7 @@ def _of_scene(track: Track, scene: Scene, included: set[str], inputs: Inputs) ->
         "unstated_spring_mass": stated("unstated_spring_mass", unstated),
         "of_added_mass": "added_mass" in included or None,
         # An angle may be that of a pendulum, so a spring constant is given only if the scene has a spring.
-        "of_spring": not track.unit.startswith("rad") or spring is not None or None,
+        "of_spring": (scene.hangs_on_spring and not track.unit.startswith("rad")) or spring is not None or None,
     }
 
 
@@ -299,8 +288,8 @@ def _small_swings(phase: Phase, laws: _Laws, windows: Windows) -> Estimate | Non
     to the value extrapolated to s = 0 is about :math:`s_1 s_2/4`, with the shares of the first and the median swing.
     """
     small = phase.small_swings
-    if small is None or phase.backbone is None:
-        return None
+    if small is None or phase.backbone is None or phase.of_pendulum:
+        return small
     squares = float(laws.values[0]) ** 2 * float(np.median(windows.amplitude**2))
     next_term = 0.25 * (phase.backbone.value / small.value) ** 2 * squares * small.value
     return Estimate(small.value, math.hypot(small.u, next_term), small.unit)
@@ -330,7 +319,7 @@ def _amiss(misfits: tuple[Misfit, ...], inputs: Inputs) -> Mapping[str, Any]:
             "damping_rate": misfit.damping_rate,
             "clock": misfit.clock,
         }
-        variables = inputs.add_alternatives(misfit.name, {name: size**2 for name, size in sizes.items()}, "B")
+        variables = inputs.add_alternatives(misfit.name, {name: size**2 for name, size in sizes.items()})
         for name, variable in variables.items():
             by_name[name] = by_name[name] + variable
     return by_name
@@ -368,7 +357,7 @@ class _Laws:
         weights = np.array([one.weight for one in self.weighted])
         weights /= weights.sum()
         self.values: F8 = weights @ each
-        self.variables = inputs.add_joint("damping_law", self.stated.joint, "A", self.stated.dof)
+        self.variables = inputs.add_joint("damping_law", self.stated.joint, self.stated.dof)
         departures = [x - value for x, value in zip(self.variables, self.stated.joint.values.tolist(), strict=True)]
         slopes = math.sqrt(weights[0]) * found[0][2]
         quantities = self.values + slopes @ np.array(departures)
@@ -380,7 +369,7 @@ class _Laws:
                 if one.fit is not self.stated:
                     covariance += weight * factor @ factor.T
             joint = Joint(("amplitude", "damping_rate", "displacement"), np.zeros(3), covariance, ("m", "1/s", "m"))
-            quantities = quantities + np.array(inputs.add_joint("choice_of_law", joint, "A"))
+            quantities = quantities + np.array(inputs.add_joint("choice_of_law", joint))
         self.start, self.rate_at_start, self.root_mean_square = quantities.tolist()
         if damping.by_statement or damping.admissible:
             return
@@ -388,7 +377,7 @@ class _Laws:
         local = local_decay(elapsed, windows.amplitude, expected, damping.scatter, best.joint.units[0])
         if local is not None:
             self.values = np.array([*local.values, self.values[2]])
-            self.start, self.rate_at_start = inputs.add_joint("local_decay", local, "A")
+            self.start, self.rate_at_start = inputs.add_joint("local_decay", local)
 
     def coefficients(self, rate: Any, scale: Any, lam: Any, start: Any) -> dict[str, tuple[Any, str]]:
         """Return the coefficients of the law of the results, in true seconds and metres.

@@ -22,7 +22,7 @@ from pipeline.damping.laws.drag import amplitudes
 from pipeline.damping.select import Damping
 from pipeline.dynamics.equation import Problem
 from pipeline.modes.mode import Modes
-from pipeline.motion.fitted import Fitted, RestPosition
+from pipeline.motion.fitted import Oscillation, RestPosition
 from pipeline.numerics.levels import NEGLIGIBLE
 from pipeline.track import Track
 from pipeline.units import amount
@@ -46,7 +46,7 @@ class Effect:
     why: str
 
 
-def tabulate(track: Track, fitted: Fitted, scene: Scene) -> tuple[Effect, ...]:
+def tabulate(track: Track, fitted: Oscillation, scene: Scene) -> tuple[Effect, ...]:
     """Return the effects table of an analysis."""
     phase, damping, unit, instrument = fitted.phase, fitted.damping, track.unit, Instrument.of(track)
     omega = phase.angular_frequency
@@ -175,7 +175,7 @@ def _disc_drag(scene: Scene, damping: Damping, omega: float, unit: str) -> Effec
     return Effect("disc_drag", predicted, measured, "1/s", len(damping.best.law.parameters) > 1, why)
 
 
-def _backbone(fitted: Fitted) -> Effect:
+def _backbone(fitted: Oscillation) -> Effect:
     name, backbone = "amplitude_dependent_frequency", fitted.phase.backbone
     if backbone is None:
         return Effect(name, None, None, "1", False, "a constant frequency describes the phase: an ideal spring's")

@@ -100,8 +100,8 @@ FORMULAS: Mapping[str, ResultFormula] = {
     ),
     "gravity": ResultFormula(
         lambda pendulum_length, frequency_at_rest: pendulum_length * frequency_at_rest**2,
-        "g = l ω₀², with ω₀ of very small swings: measured where the frequency depends on the amplitude, else "
-        "ω(1 + A²/16) with the mean A² of the run; for an angle or angular velocity",
+        "g = l ω₀², with ω₀ of very small swings by the law of the period of a pendulum; for an angle, an angular "
+        "velocity or a horizontal position l sin θ. Strong damping: ω(1 + A²/16) with the mean A² of the run",
     ),
     "quality_factor": ResultFormula(
         lambda squared_natural_frequency, damping_rate: 0.5 * squared_natural_frequency**0.5 / damping_rate,
@@ -131,7 +131,7 @@ FORMULAS: Mapping[str, ResultFormula] = {
     ),
     "drag_coefficient": ResultFormula(
         lambda drag_per_beta, coefficients: drag_per_beta * coefficients["beta"][0],
-        "C = 3π m β/(2 ω ρ S), S = π D²/4, if β belongs to the only admissible law",
+        "C = 3π M β/(2 ω ρ S) with M the mass that swings, S = π D²/4, if β belongs to the only admissible law",
         "beta_settled",
     ),
     # What other results, the curves and comparisons need.
@@ -173,7 +173,7 @@ FORMULAS: Mapping[str, ResultFormula] = {
             else angular_frequency * (1.0 + (law_rms * motion_per_value) ** 2 / 8.0)
         ),
         "Angular frequency of a pendulum at rest; a change with the amplitude that is not seen is below its u",
-        "of_angle",
+        "of_pendulum",
     ),
     "carried_air": ResultFormula(
         lambda air, disc_diameter: ADDED_MASS_SHAPE / 8.0 * air.density * disc_diameter**3, "", "of_added_mass"

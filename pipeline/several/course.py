@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,12 +13,17 @@ from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.levels import FEWEST_FOR_MEDIAN, NEGLIGIBLE, OUTLIER, coverage_factor
 from pipeline.numerics.robust import mad_sigma
-from pipeline.several.compare import Comparison, SpringRun, compare_springs
+from pipeline.several.compare import NEARER, Comparison, SpringRun, compare_springs
 
 # Maximum number of runs compared as those of one bench, which takes 0.3 s as measured if they disagree; of a larger
 # group only far runs are named.
 LARGEST_BENCH = 50
 LITTLE = 0.005  # relative spread of one bench's constants up to which no run is blamed: springs are not ideal
+# Relative difference of a run from the others from which an exchange is looked for: bobs more alike than this cannot be
+# told apart on springs that differ by the quarter of a percent that one bench's own runs do.
+LEAST_EXCHANGE = 0.003
+MOST_OTHERS = FEWEST_FOR_MEDIAN + 1  # runs of a bench with which an exchanged one is compared
+EXCHANGES = ("recordings", "masses")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,6 +54,7 @@ class Suspect:
 
     name: str
     message: str
+    partner: str = ""  # the run that it was exchanged with
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,78 +152,158 @@ def judged(runs: Sequence[CourseRun]) -> tuple[tuple[Suspect, ...], tuple[Disagr
     """Return the runs that are suspect, and the benches whose other runs disagree on their spring.
 
     A run with an implausible mass takes no part in the rest. Runs far from the median of their spring or disc are
-    suspect. The runs of one spring at one bench are compared as in file mode, which names two that were exchanged; a
-    run without which the others agree is suspect too. Then far runs of two benches are exchanged in pairs, next to good
-    runs.
+    suspect. Runs of two benches that disagree are exchanged in pairs; the other runs of each bench are the test, so
+    springs of one box may differ. The runs of one spring at one bench are compared as in file mode, which names two
+    that were exchanged; a run without which the others agree is suspect too.
     """
     plausible = [run for run in runs if not run.implausible]
     found = {run.name: Suspect(run.name, run.implausible) for run in runs if run.implausible} | _far(plausible)
-    on_spring = [run for run in plausible if run.on_spring is not None]
     benches: dict[tuple[str, str], list[CourseRun]] = {}
-    for run in on_spring:
-        benches.setdefault((run.bench, run.spring), []).append(run)
-    disagreements, exchanged = [], dict[str, Suspect]()
-    for every in benches.values():
-        verdict = _of_bench(every, [run for run in every if run.name not in found])
+    for run in plausible:
+        if run.on_spring is not None:
+            benches.setdefault((run.bench, run.spring), []).append(run)
+    apart = [every for every in benches.values() if (test := _compared(every)) is None or not test.agree]
+    found |= _between_benches(_displaced(apart, found, [run for every in benches.values() for run in every]), found)
+    disagreements = []
+    for every in apart:
+        verdict = _of_bench(every, found)
         if isinstance(verdict, Disagreement):
             disagreements.append(verdict)
         else:
             found |= verdict
-            exchanged |= verdict if len(verdict) == 2 else {}
-    found |= _between_benches(on_spring, found, exchanged)
     return tuple(found[run.name] for run in runs if run.name in found), tuple(disagreements)
 
 
-def _of_bench(every: Sequence[CourseRun], rest: Sequence[CourseRun]) -> Disagreement | dict[str, Suspect]:
-    """Return how the runs of one spring at one bench disagree, or those that are exchanged or alone do not fit."""
-    comparison = _compared(every)
-    if comparison is not None and not comparison.agree and not comparison.exchanged:
-        comparison = _compared(rest)
+def _of_bench(every: Sequence[CourseRun], found: Mapping[str, Suspect]) -> Disagreement | dict[str, Suspect]:
+    """Return how the runs of one spring at one bench disagree, or those that are exchanged or alone do not fit.
+
+    An exchange is sought among all but those that ``found`` has exchanged with another bench.
+    """
+    comparison = _compared([run for run in every if run.name not in found or not found[run.name].partner])
+    if comparison is not None and comparison.exchanged:
+        others = "the runs of their bench" if len(every) > 2 else "each other"
+        one, two = comparison.exchanged
+        return _exchange(one, two, "masses (or the periods)", others)
+    runs = [run for run in every if run.name not in found]
+    comparison = _compared(runs)
     if comparison is None or comparison.agree:
         return {}
-    if comparison.exchanged:
-        a, b = comparison.exchanged
-        return _exchange(a, b, "the runs of their bench" if len(every) > 2 else "each other")
     constants = [k.value for k in comparison.each]
     low, high = min(constants), max(constants)
     spread = high / low - 1.0
-    if spread > LITTLE and (odd := _odd_one(rest)) is not None:
-        others = f"without it, the other {len(rest) - 1} runs of its bench and spring agree"
+    if spread > LITTLE and (odd := _odd_one(runs)) is not None:
+        others = f"without it, the other {len(runs) - 1} runs of its bench and spring agree"
         return {odd.name: Suspect(odd.name, f"{others}: look at its mass and its spring")}
     message = (
         f"the {len(constants)} runs of its bench and spring disagree by {100.0 * spread:.2g} %, "
         f"{comparison.largest_deviation:.3g} standard uncertainties ({low:.5g} to {high:.5g} N/m): "
         "check masses and spring"
     )
-    return Disagreement(every[0].bench, every[0].spring, comparison.names, spread, message)
+    return Disagreement(runs[0].bench, runs[0].spring, comparison.names, spread, message)
 
 
-def _between_benches(
-    runs: Sequence[CourseRun], found: Mapping[str, Suspect], exchanged: Mapping[str, Suspect]
-) -> dict[str, Suspect]:
-    """Return the far runs of two benches that come together with good runs if they are exchanged."""
-    good, pairs = [run for run in runs if run.name not in found], dict[str, Suspect]()
-    far = [run for run in runs if run.name in found.keys() - exchanged.keys()]
-    for one, two in itertools.combinations(far, 2):
-        alike = one.spring == two.spring and _alike_exchanged(one.on_spring, two.on_spring)
-        if alike and not {one.name, two.name} & pairs.keys():
-            # Runs of the two benches come first.
-            mates = sorted(
-                (run for run in good if run.spring == one.spring),
-                key=lambda run: run.bench not in (one.bench, two.bench),
-            )
-            comparison = _compared([one, two, *mates[: FEWEST_FOR_MEDIAN + 1]])
-            if comparison is not None and set(comparison.exchanged) == {one.name, two.name}:
-                pairs |= _exchange(one.name, two.name, "the others")
-    return pairs
+@dataclass(frozen=True, slots=True)
+class _Displaced:
+    """A run that is off the others of its bench, or off those of its spring if its bench has no other run.
+
+    ``near`` is the largest relative difference from them at which an exchange may have put it right.
+    """
+
+    run: CourseRun
+    spring: SpringRun
+    constant: float
+    others: Sequence[CourseRun]
+    middle: float
+    near: float
+    alone: bool
+
+    def after(self, other: _Displaced, exchanged: str) -> SpringRun | None:
+        """Return this run with the recording or the mass of another, if that brings it near its others.
+
+        With :math:`R = \\omega_j^2/\\omega_i^2`, its constant is then :math:`k_i R` or :math:`k_j/R`.
+        """
+        ratio = (other.spring.angular_frequency.value / self.spring.angular_frequency.value) ** 2
+        constant = self.constant * ratio if exchanged == EXCHANGES[0] else other.constant / ratio
+        if abs(math.log(constant / self.middle)) > self.near:
+            return None
+        if exchanged == EXCHANGES[1]:
+            return replace(self.spring, mass_kg=other.spring.mass_kg)
+        return replace(other.spring, mass_kg=self.spring.mass_kg)
+
+    def tension(self, spring: SpringRun) -> float:
+        """Return the tension after an exchange; infinite if this run then neither agrees nor comes far nearer."""
+        others = self.others[:MOST_OTHERS]
+        before, after = (_compared([replace(self.run, on_spring=x), *others]) for x in (self.spring, spring))
+        limit = 1.0 if before is None else max(NEARER * before.tension, 1.0)
+        return math.inf if after is None or after.tension > limit else after.tension
 
 
-def _exchange(a: str, b: str, others: str) -> dict[str, Suspect]:
+def _displaced(
+    apart: Sequence[Sequence[CourseRun]], found: Mapping[str, Suspect], runs: Sequence[CourseRun]
+) -> list[_Displaced]:
+    """Return the runs of benches that disagree, and far runs of benches too small or too large for a comparison."""
+    good: dict[str, list[CourseRun]] = {}
+    for run in runs:
+        if run.name not in found:
+            good.setdefault(run.spring, []).append(run)
+    displaced = []
+    for every in apart:
+        for run in every if 1 < len(every) <= LARGEST_BENCH else [run for run in every if run.name in found]:
+            mates = [mate for mate in every if mate is not run]
+            others = [mate for mate in mates if mate.name not in found] or mates or good.get(run.spring, [])
+            values = np.log([x.spring_constant.value for x in others if x.spring_constant is not None])
+            if run.spring_constant is None or run.on_spring is None or not values.size:
+                continue
+            middle, constant = float(np.median(values)), run.spring_constant.value
+            off = abs(math.log(constant) - middle)
+            if off > LEAST_EXCHANGE:
+                near = max(NEGLIGIBLE * off, 0.0 if mates else OUTLIER * mad_sigma(values - middle))
+                displaced.append(
+                    _Displaced(run, run.on_spring, constant, others, math.exp(middle), near, alone=not mates)
+                )
+    return displaced
+
+
+def _between_benches(runs: Sequence[_Displaced], found: Mapping[str, Suspect]) -> dict[str, Suspect]:
+    """Return the runs of two benches that come together with the others if recordings or masses are exchanged.
+
+    Where a bench has no other run and the springs of the others scatter too much to decide, a far run is told which
+    exchange would explain it.
+    """
+    sure: list[tuple[float, str, _Displaced, _Displaced]] = []
+    perhaps: dict[str, Suspect] = {}
+    for one, two in itertools.combinations(runs, 2):
+        names = (one.run.name, two.run.name)
+        for exchanged in EXCHANGES if one.run.bench != two.run.bench else ():
+            moved, other = one.after(two, exchanged), two.after(one, exchanged)
+            if moved is None or other is None:
+                continue
+            tension = one.tension(moved) + two.tension(other)
+            if math.isfinite(tension):
+                sure.append((tension, exchanged, one, two))
+            elif (one.alone or two.alone) and set(names) <= found.keys():
+                for name, partner in (names, names[::-1]):
+                    also = f"and whether it was exchanged with {partner} (a second run of its bench would tell)"
+                    perhaps.setdefault(name, Suspect(name, f"{found[name].message}, {also}"))
+    pairs, solved = dict[str, Suspect](), set[str]()
+    for _, exchanged, one, two in sorted(sure, key=lambda each: each[0]):
+        names = (one.run.name, two.run.name)
+        if not solved & {*names}:
+            alike = abs(math.log(one.middle / two.middle)) < LEAST_EXCHANGE  # one spring, or two that might be one
+            what = "masses (or the periods)" if alike else exchanged
+            alone = one.alone and two.alone
+            pairs |= _exchange(*names, what, "the others" if alone else "the other runs of their benches")
+            # With the exchange, the only other run of a bench is in order too.
+            solved |= {*names, *(each.others[0].name for each in (one, two) if len(each.others) == 1)}
+    return perhaps | pairs
+
+
+def _exchange(a: str, b: str, what: str, others: str) -> dict[str, Suspect]:
     message = (
-        f"with the masses (or the periods) of {a} and {b} exchanged, they come together with {others}: "
-        "check which record belongs to which bob"
+        f"with the {what} of {a} and {b} exchanged, they come together with {others}: check which record belongs "
+        "to which bob"
     )
-    return {name: Suspect(name, message) for name in (a, b)}
+    return {a: Suspect(a, message, b), b: Suspect(b, message, a)}
 
 
 def _compared(runs: Sequence[CourseRun]) -> Comparison | None:
@@ -240,14 +326,6 @@ def _odd_one(runs: Sequence[CourseRun]) -> CourseRun | None:
     return odd[0] if len(odd) == 1 else None
 
 
-def _alike_exchanged(a: SpringRun | None, b: SpringRun | None) -> bool:
-    """Return whether two runs give nearly one constant if each has the other's mass: a quick look before the test."""
-    if a is None or b is None:
-        return False
-    k_a, k_b = (x.angular_frequency.value**2 * y.mass_kg.value for x, y in ((a, b), (b, a)))
-    return abs(math.log(k_a / k_b)) < NEGLIGIBLE
-
-
 def _far(runs: Sequence[CourseRun]) -> dict[str, Suspect]:
     """Return the runs whose spring constant, drag coefficient or amplitude is far from those of their group.
 
@@ -255,25 +333,39 @@ def _far(runs: Sequence[CourseRun]) -> dict[str, Suspect]:
     its own uncertainty, both of the logarithms. Amplitudes differ by a factor of twenty only with a wrong unit.
     """
     found: dict[str, Suspect] = {}
-    for quantity, label, least, others, advice in (
-        ("spring_constant", "spring", 2e-4, "the others of its spring", "look at its mass and its spring"),
-        ("drag", "disc", 0.02, "the others of its disc", "look at its disc and its mass"),
-        ("amplitude", "unit", 0.6, "the others", "look at the unit of its distances"),
+    for quantity, label, least, others in (
+        ("spring_constant", "spring", 2e-4, "the others of its spring"),
+        ("amplitude", "unit", 0.6, "the others"),  # before the drag coefficient, which depends on it
+        ("drag", "disc", 0.02, "the others of its disc"),
     ):
-        groups: dict[str, list[tuple[str, Estimate]]] = {}
+        groups: dict[str, list[tuple[CourseRun, Estimate]]] = {}
         for run in runs:
             value: Estimate | None = getattr(run, quantity)
             if value is not None and value.value > 0.0:
-                groups.setdefault(getattr(run, label), []).append((run.name, value))
+                groups.setdefault(getattr(run, label), []).append((run, value))
         words = {"spring_constant": "spring constant", "drag": "drag coefficient"}.get(quantity, quantity)
         for group in groups.values():
             logs = np.log([value.value for _, value in group])
             middle = float(np.median(logs))
             scatter = max(mad_sigma(logs - middle), least)
-            for (name, value), log in zip(group, logs.tolist(), strict=True):
+            for (run, value), log in zip(group, logs.tolist(), strict=True):
                 away = (log - middle) / math.hypot(scatter, value.u / value.value)
                 if len(group) > FEWEST_FOR_MEDIAN and abs(away) > OUTLIER:
                     ratio = math.exp(log - middle)
                     off = f"{ratio:.3g} times" if abs(log - middle) > 1.0 else f"{100.0 * (ratio - 1.0):+.3g} % off"
-                    found.setdefault(name, Suspect(name, f"its {words} is {off} that of {others}: {advice}"))
+                    text = f"its {words} is {off} that of {others}: {_look(quantity, ratio, disc=bool(run.disc))}"
+                    found.setdefault(run.name, Suspect(run.name, text))
     return found
+
+
+def _look(quantity: str, ratio: float, *, disc: bool) -> str:
+    """Return what to check where a value is so many times that of the others."""
+    if quantity == "amplitude":
+        return "look at the unit of its distances"
+    if quantity == "drag":
+        return "look at its disc and its mass"
+    # The constant is proportional to the square of the frequency, so to that of the rate of the times.
+    for factor, words in ((4.0, "half"), (0.25, "twice")):
+        if abs(ratio / factor - 1.0) < NEGLIGIBLE:
+            return f"look at its sampling rate, which is perhaps {words} what its times state"
+    return f"look at its mass{', its disc' if disc else ''} and its spring"

@@ -13,7 +13,7 @@ from pipeline.damping.laws import words_of
 from pipeline.damping.select import Damping
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate, Joint
-from pipeline.numerics.levels import FALSE_ALARM, STRONG
+from pipeline.numerics.levels import FALSE_ALARM
 from pipeline.numerics.regression import chi2_quantile
 from pipeline.track import F8
 
@@ -75,7 +75,7 @@ def join(runs: Sequence[tuple[str, Damping, float]]) -> JointDamping:
     def span(name: str) -> F8:
         return np.array([fits[name].joint.values[0], fits[name].smallest_m])
 
-    selected, admissible, _ = choose(fits, STRONG, span)
+    selected, admissible, _ = choose(fits, span)
     names = tuple(name for name, _, _ in runs)
     return JointDamping(names, fits, selected, admissible, _message(names, fits, selected, admissible))
 

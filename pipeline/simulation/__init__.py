@@ -7,7 +7,7 @@ the group ``springmass.integrators``; :func:`springmass.testing.check` tests it.
 
 from __future__ import annotations
 
-from failure.extensions import entry_points_of, load_named
+from failure.extensions import load_named, names_in
 from pipeline.bench.disc import effective_mass_kg as effective_mass_kg
 from pipeline.dynamics.equation import Equation as Equation
 from pipeline.dynamics.equation import Problem as Problem
@@ -26,7 +26,7 @@ _GROUP = "springmass.integrators"
 
 def integrators() -> tuple[Integrator, ...]:
     """Return the built-in integrators, then those that other packages add."""
-    return tuple(get_integrator(name) for name in _names())
+    return tuple(map(get_integrator, names_in(_GROUP, INTEGRATORS)))
 
 
 def get_integrator(name: str) -> Integrator:
@@ -44,11 +44,7 @@ def get_integrator(name: str) -> Integrator:
     """
     if name in INTEGRATORS:
         return INTEGRATORS[name]
-    if name not in _names():
-        raise DynamicsError(f"unknown method {name!r}", f"allowed are auto, {', '.join(_names())}")
+    if name not in (names := names_in(_GROUP, INTEGRATORS)):
+        raise DynamicsError(f"unknown method {name!r}", f"allowed are auto, {', '.join(names)}")
     found: Integrator = load_named(_GROUP, name, Integrator, DynamicsError)
     return found
-
-
-def _names() -> tuple[str, ...]:
-    return tuple(dict.fromkeys((*INTEGRATORS, *entry_points_of(_GROUP))))

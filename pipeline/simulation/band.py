@@ -73,7 +73,7 @@ class Band:
         return np.asarray(CubicSpline(self.t, curves, axis=-1)(np.clip(t, self.t[0], self.t[-1])))
 
 
-def uncertain(scene: Scene, measured: Joint | None = None) -> Joint:
+def uncertain(scene: Scene, measured: Joint | None) -> Joint:
     """Return the uncertain quantities of a scene that affect its motion; a joint estimate replaces the scene's own."""
     together = measured or Joint((), np.empty(0), np.empty((0, 0)), ())
     alone: dict[str, Estimate] = {}

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.numerics.levels import IMPROBABLE, NEGLIGIBLE
+from pipeline.numerics.levels import IMPROBABLE, MISFIT, NEGLIGIBLE
+from pipeline.numerics.robust import mad_sigma, median
 from pipeline.samples.condition import GAP, Samples
 from pipeline.track import F8
 from pipeline.units import amount, noun
@@ -69,9 +70,18 @@ def find_cycles(samples: Samples) -> Cycles | NoOscillation:
     resolution = samples.quantum or 0.0
     if spread <= max(3.0 * resolution, 1e-12 * max(high, -low)):
         return NoOscillation(
-            f"the {noun(track.unit)} stays within {amount(spread, track.unit, '.3g')}: nothing moves in the beam"
+            f"the {noun(track.unit)} stays within {amount(spread, track.unit, '.3g')} at "
+            f"{amount(median(y), track.unit, '.4g')}: the sensor saw something at rest"
         )
     line = _spectral_line(t, y, track.t, track.rate_hz)
+    if line is None:
+        middle = median(y)
+        if mad_sigma(y - middle) <= MISFIT * samples.noise:
+            at = amount(middle, track.unit, ".4g")
+            return NoOscillation(
+                f"the {noun(track.unit)} stays at {at}, but for noise: the sensor saw something at rest"
+            )
+        return NoOscillation("no line stands out of the spectrum's noise: there is no oscillation to be seen")
     if isinstance(line, NoOscillation):
         return line
     frequency_hz, amplitude = line
@@ -87,8 +97,8 @@ def find_cycles(samples: Samples) -> Cycles | NoOscillation:
     return Cycles(frequency_hz, count, _bounds(track.t, used, frequency_hz, track.rate_hz, periods), periods)
 
 
-def _spectral_line(t: F8, y: F8, recorded: F8, rate_hz: float) -> tuple[float, float] | NoOscillation:
-    """Return the frequency, Hz, and mean amplitude, m, of the strongest line."""
+def _spectral_line(t: F8, y: F8, recorded: F8, rate_hz: float) -> tuple[float, float] | NoOscillation | None:
+    """Return the frequency, Hz, and mean amplitude, m, of the strongest line; None if it may be noise."""
     n = max(round(float(t[-1] - t[0]) * rate_hz) + 1, 8)
     if n > 50 * t.size:
         return NoOscillation(f"{t.size} samples are spread over {n} sample intervals: too thin to find a period")
@@ -107,7 +117,7 @@ def _spectral_line(t: F8, y: F8, recorded: F8, rate_hz: float) -> tuple[float, f
         frequency_hz, power, ratio = _peak(values * window, rate_hz, finer)
         if ratio >= threshold:
             return frequency_hz, 2.0 * math.sqrt(power) / float(window.sum())
-    return NoOscillation("no line stands out of the spectrum's noise: there is no oscillation to be seen")
+    return None
 
 
 def _bridged(grid: F8, t: F8, y: F8, recorded: F8, hole_s: float) -> F8:

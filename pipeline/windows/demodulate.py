@@ -51,6 +51,7 @@ class Windows:
     counted from the window's centre.
     """
 
+    cycles: Cycles  # from which the windows were cut
     t: F8  # (w,) s, centres of the windows
     # amplitude, phase, offset: (w,) m, rad, m, values at the centre of each window. The phase is unwrapped: the total
     # phase of the oscillation.
@@ -110,13 +111,13 @@ def demodulate(samples: Samples, cycles: Cycles) -> Windows:
     basis = windows.basis(tuning.turning, tuning.decay)
     solution = solve(basis, weights)
     solution = _clip(windows, basis, solution, _spread(windows.usable, solution.residual), tuning)
-    return _finish(samples, windows, solution, tuning)
+    return _finish(samples, cycles, windows, solution, tuning)
 
 
-def follow(cycles: Cycles, windows: Windows, recorded: F8) -> Cycles:
+def follow(windows: Windows, recorded: F8) -> Cycles:
     """Cut the windows anew, along the phase, if the period changes: those of equal length are then no whole periods."""
     t, phase, u_phase = windows.t, windows.phase, np.sqrt(windows.covariance[:, 1, 1])
-    span = FEWEST_FOR_LINE
+    cycles, span = windows.cycles, FEWEST_FOR_LINE
     if t.size < 2 * span:
         return cycles
     rate = (phase[span:] - phase[:-span]) / (t[span:] - t[:-span])
@@ -237,7 +238,7 @@ def model_error(amplitude: F8, decay: F8, angular_frequency: float) -> F8:
     return (FINEST + np.abs(decay) / (10.0 * angular_frequency)) * np.abs(amplitude)
 
 
-def _finish(samples: Samples, windows: WindowSamples, solution: WindowFits, tuning: Tuning) -> Windows:
+def _finish(samples: Samples, cycles: Cycles, windows: WindowSamples, solution: WindowFits, tuning: Tuning) -> Windows:
     good, weights = solution.good, solution.weights
     if not good.any():
         raise AnalysisError(
@@ -267,6 +268,7 @@ def _finish(samples: Samples, windows: WindowSamples, solution: WindowFits, tuni
     residual = np.full(len(samples.track), np.nan)
     residual[windows.rows[inside]] = solution.residual[inside]
     return Windows(
+        cycles=cycles,
         t=t,
         amplitude=amplitude,
         phase=phase,

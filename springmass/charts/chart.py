@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.track import F8
-from pipeline.units import DISPLAY_UNITS, Unit
+from pipeline.units import RECORDED_UNITS, Unit
 from springmass.typeset import page_unit
 
 Role = Literal["data", "law", "other", "time", "rest", "flagged", "band", "mark"]
@@ -170,7 +170,7 @@ def value_label(what: str, unit: str) -> str:
     >>> value_label("amplitude", "m"), value_label("amplitude", "m/s^2")
     ('amplitude / mm', 'amplitude / (m/s²)')
     """
-    return _over(what, DISPLAY_UNITS[unit].unit)
+    return _over(what, RECORDED_UNITS[unit].unit)
 
 
 def rate_label(what: str, order: int, unit: str) -> str:

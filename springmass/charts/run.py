@@ -14,8 +14,8 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import scatter
 from pipeline.results.classic import CYCLES, Classic
 from pipeline.results.curves import Curve, Smoothed
-from pipeline.track import F8, UNUSABLE, Quality
-from pipeline.units import DISPLAY_UNITS, noun
+from pipeline.track import F8, UNUSABLE, Quality, Track
+from pipeline.units import RECORDED_UNITS, noun
 from springmass.charts.chart import Chart, ChartNote, Panel, Role, Series, band_of, line_of, rate_label, value_label
 from springmass.typeset import law_status, pretty
 
@@ -42,7 +42,7 @@ MOST_SLIDING = 2000  # amplitudes of the classic method, which overlap
 
 def position(a: Analysis, notes: Sequence[ChartNote] = ()) -> Chart:
     """Samples with their fit, residuals over the noise of one sample, and the rest position if it moves."""
-    track, factor = a.track, DISPLAY_UNITS[a.track.unit].factor
+    track, factor = a.track, RECORDED_UNITS[a.track.unit].factor
     rows = np.flatnonzero(np.isfinite(track.t))
     rows = rows[np.argsort(track.t[rows], kind="stable")]
     t, y, used = track.t[rows], track.y[rows] * factor, used_samples(a)[rows]
@@ -58,7 +58,7 @@ def position(a: Analysis, notes: Sequence[ChartNote] = ()) -> Chart:
     flagged = [Series(f"left out ({out.size})", t[out], places, "flagged", why=why)] if out.size else []
     series = [samples, *flagged, *_marks(notes)]
     noise, motion = a.estimates["noise"], a.motion
-    sigma = pretty(Estimate(factor * noise.value, factor * noise.u, DISPLAY_UNITS[track.unit].unit))
+    sigma = pretty(Estimate(factor * noise.value, factor * noise.u, RECORDED_UNITS[track.unit].unit))
     if isinstance(motion, Relaxation):
         grid, curve = _relaxing(a, motion)
         series.insert(0, line_of("fit", grid, curve * factor))
@@ -73,10 +73,18 @@ def position(a: Analysis, notes: Sequence[ChartNote] = ()) -> Chart:
     ]
     if motion.rest.drifts:
         panels.append(_rest(a, motion, factor))
-    f = motion.cycles.frequency_hz
-    end = float(t[used][0]) + DETAIL_PERIODS / f if motion.cycles.count > 2 * DETAIL_PERIODS else None
+    cycles = motion.windows.cycles
+    long = cycles.count > 2 * DETAIL_PERIODS
+    end = float(t[used][0]) + DETAIL_PERIODS / cycles.frequency_hz if long else None
     caption = f"Samples and fit; below, residuals divided by the noise of one sample, σ = {sigma}."
     return Chart("position", "Position and residuals", caption, tuple(panels), end)
+
+
+def recording(track: Track) -> Chart:
+    """The samples alone, before anything is known of their motion."""
+    what = "position" if track.unit == "m" else noun(track.unit)
+    samples = line_of("samples", track.t, track.y * RECORDED_UNITS[track.unit].factor, "data")
+    return Chart("recording", "Recording", "", (Panel(value_label(what, track.unit), (samples,), 1.3),))
 
 
 def used_samples(a: Analysis) -> NDArray[np.bool_]:
@@ -101,7 +109,7 @@ def _fit_lines(a: Analysis, motion: Oscillation, factor: float) -> list[Series]:
     """The fitted motion where the recording was analysed, or its envelope if its periods are too many to draw."""
     inside = np.isfinite(a.track.t) & ((a.flags & Quality.OUTSIDE) == 0)
     start, end = float(np.min(a.track.t[inside])), float(np.max(a.track.t[inside]))
-    periods = (end - start) * motion.cycles.frequency_hz
+    periods = (end - start) * motion.windows.cycles.frequency_hz
     grid = np.linspace(start, end, int(PER_PERIOD * min(periods, MOST_PERIODS_DRAWN)) + 2)
     rest = motion.rest.at(grid)
     if periods <= MOST_PERIODS_DRAWN:
@@ -139,11 +147,11 @@ def _rest(a: Analysis, motion: Oscillation, factor: float) -> Panel:
 
 def amplitude(a: Analysis, laws: Sequence[str] | None = None) -> Chart | None:
     """Amplitudes of the windows with the damping laws, and the selected law's residuals over u."""
-    if not isinstance(a.motion, Oscillation):
+    if (motion := a.oscillation) is None:
         return None
-    damping, windows, factor = a.motion.damping, a.motion.windows, DISPLAY_UNITS[a.track.unit].factor
+    damping, windows, factor = motion.damping, motion.windows, RECORDED_UNITS[a.track.unit].factor
     t, y, u, kept = windows.t, windows.amplitude * factor, damping.scatter.u * factor, damping.scatter.kept
-    curves = _law_lines(a, a.motion, laws)
+    curves = _law_lines(a, laws)
     points = Series("amplitude of one window", t[kept], y[kept], u=u[kept])
     why = ("left out of the fits of the laws: far from its neighbours",) * int(np.count_nonzero(~kept))
     out = [] if kept.all() else [Series("left out of the fits", t[~kept], y[~kept], "flagged", why=why)]
@@ -158,9 +166,9 @@ def amplitude(a: Analysis, laws: Sequence[str] | None = None) -> Chart | None:
     return Chart("amplitude", "Amplitude and damping laws", f"{caption}{damping.selected} over u.", (above, below))
 
 
-def _law_lines(a: Analysis, motion: Oscillation, laws: Sequence[str] | None) -> list[Series]:
+def _law_lines(a: Analysis, laws: Sequence[str] | None) -> list[Series]:
     """The selected law, the exponential and the best of the laws that cannot be ruled out; others without a name."""
-    damping = motion.damping
+    damping = a.damping
     grid = np.linspace(damping.t0, float(np.nanmax(a.track.t)), 160)
     named = list(laws or dict.fromkeys((damping.selected, *damping.admissible)))[: len(laws or ()) or MOST_NAMED]
     if laws is None and EXPONENTIAL in damping.fits and EXPONENTIAL not in named:
@@ -171,7 +179,7 @@ def _law_lines(a: Analysis, motion: Oscillation, laws: Sequence[str] | None) -> 
         words = "exponential, linear drag" if name == EXPONENTIAL else name
         together = name in unnamed and len(unnamed) > 1
         label = f"{len(unnamed)} other laws" if together else f"{words} ({law_status(damping, name)})"
-        curve = damping.fits[name].amplitude(grid - damping.t0) * DISPLAY_UNITS[a.track.unit].factor
+        curve = damping.fits[name].amplitude(grid - damping.t0) * RECORDED_UNITS[a.track.unit].factor
         role: Role = "law" if name == damping.selected else "rest" if name in unnamed else "other"
         lines.append(line_of(label, grid, curve, role))
     return lines
@@ -184,9 +192,9 @@ def frequency(a: Analysis) -> Chart | None:
     include the scatter of the windows about a smooth curve and its correlation, or the misfit of all phases if that is
     larger.
     """
-    if not isinstance(a.motion, Oscillation) or a.motion.windows.t.size < FEWEST_WINDOWS:
+    if (motion := a.oscillation) is None or motion.windows.t.size < FEWEST_WINDOWS:
         return None
-    phase, windows = a.motion.phase, a.motion.windows
+    phase, windows = motion.phase, motion.windows
     order = np.argsort(windows.t, kind="stable")
     own = windows.covariance[:, 1, 1]
     spread = scatter(windows.t, phase.residual, np.sqrt(own))
@@ -198,7 +206,7 @@ def frequency(a: Analysis) -> Chart | None:
         (slope, _), covariance = np.polyfit(t - t.mean(), turned, 1, w=np.sqrt(weight), cov="unscaled")
         points.append((float(np.mean(windows.amplitude[part])), slope, covariance[0, 0] ** 0.5))
     size, slope, u = np.array(sorted(points), np.float64).T
-    factor, mean = DISPLAY_UNITS[a.track.unit].factor, phase.angular_frequency.value
+    factor, mean = RECORDED_UNITS[a.track.unit].factor, phase.angular_frequency.value
     grid = np.linspace(float(size[0]), float(size[-1]), 100)
     shift = 1e3 / (2.0 * np.pi)
     changes = phase.backbone is not None
@@ -214,10 +222,10 @@ def frequency(a: Analysis) -> Chart | None:
 
 def spectrum(a: Analysis) -> Chart | None:
     """Amplitude spectra of the recording and of the residuals of its fit, with the highest peaks."""
-    if not isinstance(a.motion, Oscillation) or (spectra := spectrum_of(a, a.motion)) is None:
+    if (motion := a.oscillation) is None or (spectra := spectrum_of(a, motion)) is None:
         return None
     f, whole, left = spectra
-    factor, best = DISPLAY_UNITS[a.track.unit].factor, peaks_of(whole)
+    factor, best = RECORDED_UNITS[a.track.unit].factor, peaks_of(whole)
     floor = float(np.median(left[left > 0])) if (left > 0).any() else float(whole.max()) * 1e-6
     lines = (
         line_of("residuals of the fit", f, left * factor, "other"),
@@ -232,25 +240,21 @@ def spectrum(a: Analysis) -> Chart | None:
 
 def drag(a: Analysis) -> Chart | None:
     """Effective drag coefficient against amplitude, if scene and recording determine it."""
-    if not isinstance(a.motion, Oscillation):
-        return None
-    motion, unit = a.motion, a.track.unit
-    curve = motion.derived.drag_curve(motion.damping, motion.windows)
-    if curve is None:
+    unit = a.track.unit
+    if (curve := a.drag_curve()) is None:
         return None
     # The long error bar of a stretch with hardly any damping would compress everything else.
     most = 2.5 * float(np.max(np.abs(curve.y) + curve.u))
     both = ((curve.y, curve.u), (curve.y_points, curve.u_points))
     ends = np.clip(np.concatenate([y + sign * u for y, u in both for sign in (-1, 1)]), -most, most)
     low, high = min(0.0, float(np.min(ends))), float(np.max(ends))
-    series = _with_band(
-        curve, DISPLAY_UNITS[unit].factor, 1.0, "a stretch of the run", f"law {motion.damping.selected}"
-    )
+    series = _with_band(curve, RECORDED_UNITS[unit].factor, 1.0, "a stretch of the run", f"law {a.damping.selected}")
     shown = (low, high + 0.08 * (high - low))
     panel = Panel("effective drag coefficient", series, 3.0, value_label("amplitude", unit), range=shown)
     caption = (
-        "−dA/dt · 3π m/(2 ω ρ S A²): the coefficient of purely quadratic drag on the disc with the same energy loss, "
-        "that of the spring included. Where it depends on the amplitude, a constant does not describe the drag."
+        "−dA/dt · 3π M/(2 ω ρ S A²), M the mass that swings: the coefficient of purely quadratic drag on the disc with "
+        "the same energy loss, that of the spring included. Where it depends on the amplitude, a constant does not "
+        "describe the drag."
     )
     return Chart("drag", "Effective drag coefficient", caption, (panel,))
 
@@ -265,11 +269,7 @@ def _with_band(curve: Curve, x: float, y: float, points: str, law: str) -> tuple
 
 def energy(a: Analysis) -> Chart | None:
     """Mechanical energy with its band, and the deviation of single amplitudes from the law."""
-    if not isinstance(a.motion, Oscillation):
-        return None
-    motion = a.motion
-    curve = motion.derived.energy_curve(motion.damping, motion.windows)
-    if curve is None:
+    if (curve := a.energy_curve()) is None:
         return None
     low, high = float(np.min(curve.y - curve.u)), float(np.max(curve.y))
     law = np.interp(curve.x_points, curve.x, curve.y)
@@ -278,29 +278,29 @@ def energy(a: Analysis) -> Chart | None:
     off = 100.0 * (curve.y_points[there] / law[there] - 1.0)
     width = 100.0 * curve.u[moves] / curve.y[moves]
     label = "energy / mJ" if curve.unit == "J" else "energy per mass / (mJ/kg)"
-    series = _with_band(curve, 1.0, 1e3, "from single amplitudes", f"law {motion.damping.selected}")
+    series = _with_band(curve, 1.0, 1e3, "from single amplitudes", f"law {a.damping.selected}")
     above = Panel(label, series, 2.6, log=low < high / 20.0 if low > 0.0 else None)
     band = band_of("± u of the law", curve.x[moves], np.zeros(width.size), width)
     points = Series("deviation", curve.x_points[there], off, u=100.0 * curve.u_points[there] / law[there])
     below = Panel("deviation / %", (band, points), 1.3, zero=True)
-    mass = motion.derived.effective_mass_kg
+    mass = a.derived.effective_mass_kg
     of = f"the mass that oscillates, {pretty(mass)}" if mass is not None else "one kilogram, as no mass was given"
-    caption = f"Energy m ω² A²/2 of {of}; below, the deviation of single amplitudes from the law."
+    caption = f"Energy M ω² A²/2 of {of}; below, the deviation of single amplitudes from the law."
     return Chart("energy", "Energy", caption, (above, below))
 
 
 def motion(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
     """Velocity and acceleration, and the difference of the velocity from the fitted law in its band of u."""
     smoothed, unit = smoothed or _smoothed(a), a.track.unit
-    if smoothed is None or not isinstance(a.motion, Oscillation) or unit not in ("m", "rad"):
+    if smoothed is None or (fit := a.oscillation) is None or unit not in ("m", "rad"):
         return None
     rows = np.flatnonzero(np.isfinite(smoothed.position))
     rows = rows[np.argsort(smoothed.t[rows], kind="stable")]
-    rows = rows[:: max(1, round(a.track.rate_hz / a.motion.cycles.frequency_hz / PER_PERIOD))]
+    rows = rows[:: max(1, round(a.track.rate_hz / fit.windows.cycles.frequency_hz / PER_PERIOD))]
     t, velocity, u = smoothed.t[rows], smoothed.velocity[rows], smoothed.u_velocity[rows]
     names = ("velocity", "acceleration") if unit == "m" else ("derivative", "2nd derivative")
-    k = DISPLAY_UNITS[unit].factor
-    off = k * (velocity - model_motion(a.motion, t)[1])
+    k = RECORDED_UNITS[unit].factor
+    off = k * (velocity - model_motion(fit, t)[1])
     band = rows.size // 400 + 1  # u changes slowly
     first = [line_of(names[0], t, velocity)]
     if a.track.velocity is not None:
@@ -316,16 +316,16 @@ def motion(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
         f"{names[0].capitalize()} and {names[1]} from the fit, not by differences of neighbours; below, the "
         f"difference from the fitted law, with ±u. motion.csv holds them with their uncertainties at every sample."
     )
-    end = float(t[0]) + DETAIL_PERIODS / a.motion.cycles.frequency_hz
+    end = float(t[0]) + DETAIL_PERIODS / fit.windows.cycles.frequency_hz
     return Chart("motion", "Velocity and acceleration", caption, panels, end if end < t[-1] else None)
 
 
 def phase(a: Analysis) -> Chart | None:
     """Velocity against displacement: turns of the fitted motion spread over the run, and recorded velocities."""
-    if not isinstance(a.motion, Oscillation):
+    if (motion := a.oscillation) is None:
         return None
-    motion, track, unit = a.motion, a.track, a.track.unit
-    factor, period = DISPLAY_UNITS[unit].factor, 2.0 * np.pi / a.motion.phase.angular_frequency.value
+    track, unit = a.track, a.track.unit
+    factor, period = RECORDED_UNITS[unit].factor, 2.0 * np.pi / motion.phase.angular_frequency.value
     inside = (a.flags & Quality.OUTSIDE) == 0
     first, end = motion.damping.t0, float(np.nanmax(track.t[inside]))
     turns = max(int((end - first) / period), 1)
@@ -349,10 +349,9 @@ def phase(a: Analysis) -> Chart | None:
 
 def classic_method(a: Analysis, classic: Classic) -> Chart | None:
     """The lab report's choices over this analysis: two maxima, two extremes, sliding windows and their exponential."""
-    ours = amplitude(a, [a.motion.damping.selected]) if isinstance(a.motion, Oscillation) else None
-    if ours is None:
+    if (ours := amplitude(a, [a.damping.selected])) is None:
         return None
-    factor, period = DISPLAY_UNITS[a.track.unit].factor, classic.estimates["period"].value
+    factor, period = RECORDED_UNITS[a.track.unit].factor, classic.estimates["period"].value
     start, end = (float(classic.crests_t[i]) + s * 0.75 * period for i, s in ((0, -1), (-1, 1)))
     near = np.flatnonzero(used_samples(a) & (a.track.t >= start) & (a.track.t <= end))
     if not near.size:
@@ -450,7 +449,7 @@ def spectrum_of(a: Analysis, motion: Oscillation) -> tuple[F8, F8, F8] | None:
     window = np.hanning(count)
     scale = 2.0 / window.sum()
     f: F8 = np.asarray(np.fft.rfftfreq(count, 1.0 / track.rate_hz), np.float64)
-    keep = (f > 0.0) & (f <= SHOWN_MULTIPLES * motion.cycles.frequency_hz)
+    keep = (f > 0.0) & (f <= SHOWN_MULTIPLES * motion.windows.cycles.frequency_hz)
     if np.count_nonzero(keep) < LEAST_ROWS:
         return None
     whole, residual = (scale * np.abs(np.fft.rfft(window * (y - y.mean())))[keep] for y in (whole, residual))

@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from acquisition.errors import visible
-from pipeline.analyse import Analysis, Oscillation
+from pipeline.analyse import Analysis
 from pipeline.bench.disc import STEADY_DISC_DRAG, disc_drag_coefficient
 from pipeline.several.compare import Comparison
 from pipeline.several.masses import Hooke, MassLine
 from pipeline.track import F8
-from pipeline.units import DISPLAY_UNITS, noun
+from pipeline.units import RECORDED_UNITS, noun
 from springmass.charts.chart import Chart, Panel, Series, band_of, line_of, value_label
 from springmass.charts.run import DETAIL_PERIODS, used_samples
 from springmass.typeset import prefixed, pretty
@@ -28,11 +28,11 @@ def overlay(names: Sequence[str], analyses: Sequence[Analysis]) -> Chart | None:
         used = used_samples(a)
         if not used.any():
             continue
-        t, y, motion = a.track.t[used], a.track.y[used], a.motion
+        t, y, motion = a.track.t[used], a.track.y[used], a.oscillation
         rest = np.full(t.size, np.mean(y))
-        if isinstance(motion, Oscillation):
-            rest, fastest = motion.rest.at(t), max(fastest, motion.cycles.frequency_hz)
-        series.append(line_of(visible(name), t - t[0], (y - rest) * DISPLAY_UNITS[unit].factor, "other"))
+        if motion is not None:
+            rest, fastest = motion.rest.at(t), max(fastest, motion.windows.cycles.frequency_hz)
+        series.append(line_of(visible(name), t - t[0], (y - rest) * RECORDED_UNITS[unit].factor, "other"))
     what = "displacement" if unit == "m" else f"{noun(unit)} from rest"
     panel = Panel(value_label(what, unit), tuple(series), x_label="time since the first sample used / s")
     caption = "Displacement of every run from its rest position."
@@ -153,14 +153,11 @@ LARGEST_DRAWN = 1e100  # maximum magnitude of a number in a row, whose square is
 
 def drag_points(analysis: Analysis) -> list[list[float]]:
     """Return Re, KC, drag coefficient and its u at amplitudes spaced evenly on a logarithmic scale."""
-    motion, diameter, estimates = analysis.motion, analysis.scene.disc_diameter_m, analysis.estimates
-    if not isinstance(motion, Oscillation):
+    diameter, estimates = analysis.scene.disc_diameter_m, analysis.estimates
+    curve, displacement = analysis.drag_curve(), analysis.derived.displacement
+    if curve is None or diameter is None or displacement is None or "reynolds_number" not in estimates:
         return []
-    derived = motion.derived
-    curve = derived.drag_curve(motion.damping, motion.windows)
-    if curve is None or diameter is None or derived.displacement is None or "reynolds_number" not in estimates:
-        return []
-    lengths: F8 = curve.x * derived.displacement.value
+    lengths: F8 = curve.x * displacement.value
     order = np.argsort(lengths)
     if not lengths[order[0]] > 0:
         return []

@@ -31,7 +31,7 @@ MAIN_COMMANDS = {
     "batch": "Analyse a course of many runs into one table and a page.",
     "ports": "List serial ports, what speaks on them, and the sensors known.",
     "record": "Record a run from the bench, every byte of it.",
-    "page": "Show a recording in a browser, live or afterwards.",
+    "page": "Open the window: drop recordings, answer in fields, read results.",
 }
 """The commands that a student, a course and a bench need, with their help."""
 FURTHER_COMMANDS = {

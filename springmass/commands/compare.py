@@ -152,15 +152,13 @@ def _print_text(compared: SpringComparison, runs: list[Run]) -> None:
 
 
 def _course_text(comparison: CourseComparison) -> str:
-    from pipeline.numerics.estimate import format_value
-
     lines = [f"{comparison.runs} runs; benches distinguished by {comparison.bench}", ""]
     for group in comparison.agreements:
         of = f" of {group.group}" if group.group else ""
         if group.mean is None:
             lines.append(f"{group.quantity}{of}: no mean; {group.why}")
             continue
-        lines.append(f"{group.quantity}{of}: {format_value(group.mean.value, group.mean.u, group.mean.unit)}")
+        lines.append(f"{group.quantity}{of}: {group.mean}")
         within = "one run a bench" if math.isnan(group.within) else f"{group.within:.2g} within a bench"
         benches = f"{group.between:.2g} between {group.benches} benches"
         between = "one bench" if math.isnan(group.between) else benches

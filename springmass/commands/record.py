@@ -24,7 +24,7 @@ from acquisition.simulated import VirtualPort, VirtualRangefinder, VirtualSensor
 from pipeline.bench.air import speed_of_sound
 from pipeline.bench.disc import scene_air
 from pipeline.bench.scene import Scene
-from pipeline.numerics.estimate import format_value
+from pipeline.numerics.estimate import Estimate
 from springmass.commands.given import GivenOptions
 from springmass.commands.options import DecoderOptions, FileArgument, PageOptions
 from springmass.commands.parameters import (
@@ -60,7 +60,6 @@ from storage.recovery.recover import recover
 from storage.recovery.report import RecoveredRun, RecoverReport
 from storage.run_file.reading import open_run
 
-U_RULER_M = 0.5e-3
 SIMULATED_FAMILY = "line-protocol"
 UNLIMITED_S = 3600.0  # assumed duration of a run without --seconds, for the check of disk space
 
@@ -354,15 +353,16 @@ class _Bench:
         if not ruler:
             return self._still(seconds, "let the bob hang still")
         if len(ruler) == 1:
-            return self.session.calibrate([self._still(seconds, "let the bob hang still")], ruler, U_RULER_M)
+            return self.session.calibrate([self._still(seconds, "let the bob hang still")], ruler)
         points = []
         for distance_m in ruler:
             self._ask(f"bring the target to {distance_m:g} m by the ruler, then press Enter")
             points.append(self._still(seconds, "keep it still"))
-        self.session.calibrate(points, ruler, U_RULER_M)
+        self.session.calibrate(points, ruler)
         calibration = self.session.sensors[0].calibration
-        scale = format_value(calibration.scale, calibration.u_scale)
-        self.console.line(f"scale {scale}, offset {format_value(calibration.offset_m, calibration.u_offset_m, 'm')}")
+        scale = Estimate(calibration.scale, calibration.u_scale)
+        offset = Estimate(calibration.offset_m, calibration.u_offset_m, "m")
+        self.console.line(f"scale {scale}, offset {offset}")
         self._ask("hang the bob over the sensor, then press Enter")
         return self._still(seconds, "let it hang still")
 

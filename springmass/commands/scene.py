@@ -23,6 +23,7 @@ SCENE_TEMPLATE = """\
 [spring]
 # mass_kg = { value = ..., u = ... }        # kg, such as 0.0104 and 0.0001: a third of it swings along
 # constant_n_per_m = ...                    # for springmass simulate; an analysis measures it
+# none = true                               # no spring bears the bob: a torsion balance, a light spot, a beam
 
 [pendulum]
 # length_m = { value = ..., u = ... }       # m, from the pivot to the middle of the bob: its angle gives g

@@ -6,7 +6,6 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
-from pipeline.analysis import Oscillation
 from springmass import __version__
 from springmass.commands.given import GivenOptions
 from springmass.commands.options import FileArgument, Json, ReadPairs
@@ -48,9 +47,9 @@ def trade(
     if recording is not None:
         analysis = Run.of(recording, given_scene, AnalysisOptions(**reading.options.given())).analysis
         analysis.track.demand_length("a simulation of the motion")
-        if not isinstance(analysis.motion, Oscillation):
+        if (found := analysis.oscillation) is None:
             raise ProgramError(f"{recording}: {analysis.motion.why}", "name a run that oscillates", UNREADABLE)
-        motion = motion_of(analysis, analysis.motion)
+        motion = motion_of(analysis, found)
     elif given_scene is not None:
         from springmass.simulations.simulation import prepare
 

@@ -106,10 +106,7 @@ def compare_runs(
     """
     demand_one_spring([(run.name, run.scene) for run in runs])
     motions = [(run.name, _moving(run)) for run in runs]
-    springs = [
-        SpringRun.of(name, motion.derived, clock=run.analysis.track.clock)
-        for (name, motion), run in zip(motions, runs, strict=True)
-    ]
+    springs = [SpringRun.of(run.name, run.analysis.derived, clock=run.analysis.track.clock) for run in runs]
     comparison = compare_springs(
         springs, spring_mass_kg=runs[0].scene.spring_mass_kg, mass_correlation=mass_correlation
     )
@@ -150,7 +147,7 @@ def comparison_json(compared: SpringComparison, provenance: Mapping[str, Any]) -
     """Return a comparison as a JSON-serialisable mapping; numbers that are not finite become None."""
     runs = compared.runs.values()
     springs = compared.comparison
-    derived = [_moving(run).derived for run in runs]
+    derived = [run.analysis.derived for run in runs]
     each = zip(springs.names, derived, springs.each, springs.own_u, springs.pulls, strict=True)
     numbers = ("chi2", "dof", "largest_deviation", "exchanged", "exchanged_chi2", "message")
     content: dict[str, Any] = {
@@ -193,9 +190,8 @@ def comparison_json(compared: SpringComparison, provenance: Mapping[str, Any]) -
 
 
 def _moving(run: Run) -> Oscillation:
-    motion = run.analysis.motion
-    if not isinstance(motion, Oscillation):
-        raise AnalysisError(f"{run.name}: no oscillation to compare: {motion.why}")
+    if (motion := run.analysis.oscillation) is None:
+        raise AnalysisError(f"{run.name}: no oscillation to compare: {run.why}")
     return motion
 
 

@@ -11,7 +11,6 @@ from decimal import Decimal, InvalidOperation
 import numpy as np
 
 from acquisition.units import measure_of, time_unit
-from pipeline.analyse import Oscillation
 from pipeline.findings.finding import Finding, by_severity, word
 from pipeline.notice import Notice
 from pipeline.numerics.estimate import Estimate
@@ -148,20 +147,21 @@ def _value(row: Reported, run: Run, others: Mapping[str, Run]) -> tuple[str, Not
 
     The factor is None where the uncertainty of the value cannot be judged.
     """
-    expected, motion = _expected(run, row.name), run.analysis.motion
+    expected = _expected(run, row.name)
     ours = expected[0]
     about = {"run": row.run, "name": _word(row.name), "printed": row.printed, "ours": str(ours)}
     if row.name == "noise":
         if ours.value < TOO_SMALL * row.value and row.value < TOO_SMALL * ours.value:
             return "agrees", None, None
         return "not the noise of a sample", Notice("reported_not_noise", about), None
-    linear = motion.damping.fits.get("linear") if isinstance(motion, Oscillation) else None
+    linear = run.analysis.damping.fits.get("linear")
     if row.name in ("damping_rate", "gamma") and linear is not None and linear.rejection:
         if _agrees(run, row, ours):
             return "agrees", None, 1.0
         return "an exponential does not describe this decay", Notice("reported_not_exponential", about), 1.0
     if (echoes := _echoes(row, run, ours)) is not None:
-        return "the velocities include false echoes", Notice("reported_false_echoes", {**about, **echoes}), 1.0
+        verdict = f"the velocities {echoes['include']} false echoes"
+        return verdict, Notice("reported_false_echoes", {**about, **echoes}), 1.0
     # A spring that nobody weighed makes k so uncertain that even exchanged values would agree: it counts last.
     unweighed = row.name == "spring_constant" and run.scene.spring_mass_kg is None
     hypotheses = [("agrees", each) for each in expected[unweighed:]]
@@ -179,22 +179,24 @@ def _value(row: Reported, run: Run, others: Mapping[str, Run]) -> tuple[str, Not
     return "differs", Notice("reported_differs", about), None
 
 
-def _echoes(row: Reported, run: Run, ours: Estimate) -> dict[str, float] | None:
+def _echoes(row: Reported, run: Run, ours: Estimate) -> dict[str, float | str] | None:
     """Return the number of false echoes and the ratio to this analysis if a velocity or Re is that of all samples.
 
-    Without recorded velocities a value that is too large is enough.
+    Recorded velocities prove it; without them a value that is too large is only perhaps theirs.
     """
     echoes, velocity = run.result["quality"].get("false_echo", 0), run.loaded.track.velocity
     if row.name not in ("velocity_rms", "reynolds_number") or not echoes or ours.value <= 0.0:
         return None
     ratio = row.value / ours.value
-    if ratio < ECHOES or ratio - 1.0 < DIFFERENT_U * ours.u / ours.value:
+    if ratio < ECHOES or _agrees(run, row, ours):
         return None
+    include = "perhaps include"
     if velocity is not None and np.isfinite(velocity).any():
+        include = "include"
         whole = float(np.sqrt(np.nanmean(np.square(velocity)))) / run["velocity_rms"].value
         if abs(ratio - whole) > 0.25 * (whole - 1.0):
             return None
-    return {"echoes": echoes, "ratio": ratio}
+    return {"echoes": echoes, "ratio": ratio, "include": include}
 
 
 def _uncertainty(row: Reported, scale: float, run: Run, rows: Sequence[Reported]) -> Notice | None:

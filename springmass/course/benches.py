@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from pipeline.bench.plausible import slips
-from pipeline.bench.scene import Scene
+from pipeline.bench.scene import PLACES, Scene
 from pipeline.numerics.estimate import Estimate
 from pipeline.several.compare import SpringRun
-from pipeline.several.course import Agreement, CourseRun, Disagreement, Suspect, agreement, judged
+from pipeline.several.course import LITTLE, Agreement, CourseRun, Disagreement, Suspect, agreement, judged
 from springmass.course.results_csv import COURSE
 from springmass.errors import UNREADABLE, ProgramError
 
@@ -29,8 +29,9 @@ class CourseComparison:
     """A comparison of the runs with a period; ``bench`` is the column that distinguishes benches.
 
     The agreements are of the spring constants of each spring and the drag coefficients of each disc, without the
-    suspects: runs with an implausible mass, and runs that differ from their course. ``disagreements`` are benches whose
-    other runs of one spring disagree, and ``laws`` counts for how many runs each damping law was selected.
+    runs that are named: suspects have an implausible mass or differ from their course, and ``disagreements`` are
+    benches whose other runs of one spring disagree, which count as named beyond half a percent. ``laws`` counts for how
+    many runs each damping law was selected.
     """
 
     runs: int
@@ -57,6 +58,7 @@ def compare_rows(rows: Sequence[Mapping[str, Any]]) -> CourseComparison:
     runs = [_run(row, by, alone=len(courses) == 1) for row in moving]
     differing, disagreements = judged(runs)
     named = {suspect.name for suspect in differing}
+    named |= {name for bench in disagreements if bench.spread > LITTLE for name in bench.names}
     agreements = []
     for quantity, label in (("spring_constant", "spring"), ("drag", "disc")):
         groups: dict[str, list[CourseRun]] = {}
@@ -101,7 +103,7 @@ def _agreement(quantity: str, name: str, group: Sequence[CourseRun]) -> Agreemen
 def _run(row: Mapping[str, Any], bench: str, *, alone: bool) -> CourseRun:
     name = row["run"] if alone else f"{row[COURSE]}: {row['run']}"
     k, omega, mass = (_estimate(row, x) for x in ("spring_constant", "natural_angular_frequency", "own_mass_kg"))
-    bob, spring, disc = (_estimate(row, x) for x in ("bob_mass_kg", "spring_mass_kg", "disc_diameter_m"))
+    scene = Scene(**{place: _estimate(row, place) for place in PLACES})
     points = np.array(json.loads(row.get("drag_points") or "[]"))
     middle = points[len(points) // 2] if len(points) else None
     on_spring = spring_constant = None
@@ -110,7 +112,6 @@ def _run(row: Mapping[str, Any], bench: str, *, alone: bool) -> CourseRun:
         spring_constant = Estimate(
             k.value, k.value * math.hypot(2.0 * omega.u / omega.value, mass.u / mass.value), "N/m"
         )
-    bench_of_run = Scene(bob_mass_kg=bob, spring_mass_kg=spring, disc_diameter_m=disc)
     return CourseRun(
         name=name,
         spring=_label(row, "spring", "spring_mass_kg"),
@@ -121,8 +122,8 @@ def _run(row: Mapping[str, Any], bench: str, *, alone: bool) -> CourseRun:
         amplitude=_estimate(row, "amplitude"),
         unit=row.get("unit") or "",
         on_spring=on_spring,
-        spring_mass_kg=spring,
-        implausible="; ".join(each.clause for each in slips(bench_of_run) if each.decides),
+        spring_mass_kg=scene.spring_mass_kg,
+        implausible="; ".join(each.clause for each in slips(scene) if each.decides),
     )
 
 

@@ -92,7 +92,7 @@ def line_of(row: Mapping[str, Any], tags: Sequence[str]) -> dict[str, Any]:
         "link": "",
         "look": look,
         "need": [_STATUS.get(row["status"], 2), row["errors"], len(row["tell"]), row.get("reduced_chi2") or 0.0],
-        "tell": [row["error"]] if failed else row["tell"],
+        "tell": [sentence(row["error"].removeprefix(f"{row['path']}: "))] if failed else row["tell"],
         "notes": [message for _, message in json.loads(row.get("messages") or "[]")],
         "differs": "",
         "tags": [row[tag] or "" for tag in tags],

@@ -20,9 +20,7 @@ from typing import Any
 from springmass.errors import LOG, UNREADABLE, ProgramError
 from storage.atomic import writing
 from storage.errors import WriteFailed
-
-if sys.platform != "win32":
-    import fcntl
+from storage.locks import lock
 
 DATABASE, LOCK = "course.db", "course.lock"
 _TABLE = "CREATE TABLE IF NOT EXISTS runs (key TEXT PRIMARY KEY, made_of TEXT, row TEXT)"
@@ -85,14 +83,12 @@ def opened(folder: Path) -> Iterator[Store]:
         file = path.open("a+b")
     with file:
         try:
-            if sys.platform != "win32":
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if not lock(file):
+                LOG.info(f"{folder}: there are no locks here; let only one batch at a time write there")
         except BlockingIOError as error:
             file.seek(0)
             holder = file.read(200).decode("utf-8", "replace") or "another process"
             raise ProgramError(f"{folder}: in use by {holder}", "wait for its end") from error
-        except OSError:
-            LOG.info(f"{folder}: this disk has no locks; let only one batch at a time write there")
         with writing(path):
             file.truncate(0)
             since = datetime.now(UTC).isoformat(timespec="seconds")

@@ -11,7 +11,7 @@ from typing import Any
 
 from acquisition.errors import visible
 from acquisition.recordings.questions import Question
-from pipeline.analyse import Analysis, Oscillation
+from pipeline.analyse import Analysis
 from pipeline.bench.scene import PLACES
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate, UpperLimit
@@ -119,9 +119,9 @@ def row_of(run: Run, path: str) -> dict[str, Any]:
 
 
 def _damping(analysis: Analysis) -> dict[str, Any]:
-    if not isinstance(analysis.motion, Oscillation):
+    damping, derived = analysis.damping, analysis.derived
+    if not damping.fits:
         return {}
-    damping, derived = analysis.motion.damping, analysis.motion.derived
     undetermined = [name for name, x in derived.coefficients.items() if isinstance(x, UpperLimit)]
     matrix = [[_number(x) for x in line] for line in derived.joint.correlation.round(DIGITS).tolist()]
     row = _numbers(derived.coefficients) | {

@@ -34,18 +34,16 @@ def loaded_of(source: Any, options: AnalysisOptions) -> Loaded:
     _demand(options, {"unit", "time_unit"}, type(source).__name__)
     t, y, flags = _columns(source)
     about: Mapping[str, Any] = getattr(source, "attrs", {})
-    of_y: Mapping[str, Any] = getattr(y.values, "attrs", {})
     measure = _measure(options.unit or y.unit or _unit_of(y.values) or "m")
     track = Track.from_arrays(
         _seconds(t.values, options.time_unit or t.unit or _unit_of(t.values)),
         _numbers(y.values, "values") * 10.0**measure.power * measure.factor,
         flags=flags,
         **{name: about[name] for name in ("rate_hz", "sigma_m", "quantum_m", "kind") if name in about},
-        quantity=of_y.get("quantity", measure.quantity),
         unit=measure.si,
     )
     velocity = np.asarray(source["velocity"], np.float64) if ABOUT in about and "velocity" in source else None
-    samples = Block(0, track.t, track.y, track.flags, None, velocity, track.quantity, track.unit)
+    samples = Block(0, track.t, track.y, track.flags, None, velocity, measure.quantity, track.unit)
     if (recorded := _stated(source, about, samples)) is not None:
         return recorded
     clock = getattr(t.values, "attrs", {}).get("clock", track.clock)

@@ -112,7 +112,7 @@ def _refuse(path: Path, what: str, options: LoadOptions, allowed: Sequence[str])
         raise ProgramError(f"{path}: {what} states everything, got {', '.join(given)} too", "leave that out")
 
 
-def _load_run(path: Path, *, unverified: bool = False) -> Loaded:
+def _load_run(path: Path, *, unverified: bool) -> Loaded:
     sha256 = sha256_of(path)
     with open_run(path, unverified=unverified) as run:
         try:

@@ -41,7 +41,6 @@ def to_track(
         flags=samples.flags,
         **of_source,
         velocity=samples.velocity,
-        quantity=samples.quantity,
         unit=samples.unit,
         trigger_s=float(moments[0]) if moments else None,  # when the bob left its rest position
         **_clock_comparison(samples, info, facts),

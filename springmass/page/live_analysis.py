@@ -43,17 +43,17 @@ def motion_message(found: Run | NotYet, wanted_u_s: float | None = None, *, char
     if isinstance(found, NotYet):
         return {"type": "motion", "why": found.why}
     analysis = found.analysis
-    motion, times = analysis.motion, analysis.track.t
+    motion, times = analysis.oscillation, analysis.track.t
     graver = [f for f in analysis.findings if f.severity != "info"]
     message: dict[str, Any] = {
         "type": "motion",
-        "why": "",
+        "why": "" if motion is not None else analysis.motion.why,
         "accuracy": found.how.accuracy,
         "t_s": float(np.nanmax(times)),
         "findings": [picked(f, ("code", "severity", "message", "advice")) for f in graver],
     }
     shown = {name: analysis.estimates[name] for name in NAMES if name in analysis.estimates}
-    if isinstance(motion, Oscillation):
+    if motion is not None:
         shown |= _amplitude_now(motion, analysis.track.unit)
         message |= {
             "law": motion.damping.selected,
@@ -66,8 +66,6 @@ def motion_message(found: Run | NotYet, wanted_u_s: float | None = None, *, char
         if charts:
             made = {name: CHARTS[name](analysis) for name in SHOWN_CHARTS}
             message["charts"] = {name: to_json(chart) for name, chart in made.items() if chart is not None}
-    else:
-        message["why"] = motion.why
     estimates = {name: {"value": x.value, "u": x.u, "unit": x.unit, "text": str(x)} for name, x in shown.items()}
     return {**message, "estimates": estimates}
 

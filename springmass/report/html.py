@@ -7,10 +7,10 @@ import functools
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from acquisition.errors import visible
-from pipeline.analyse import Oscillation
 from pipeline.findings.finding import kinds
 from pipeline.numerics.estimate import Estimate
 from pipeline.quantities import EFFECTS, INPUTS
@@ -93,7 +93,7 @@ def render_html(
     return template("report.html.j2").render(
         title=", ".join(run.name for run in runs),
         parts=parts,
-        tables=list(_tables(runs)),
+        tables=list(tables_of(runs)),
         several=overview,
         compared=compared,
         of_reported={code for code, kind in kinds().items() if "reported" in kind.about},
@@ -125,6 +125,11 @@ def script_sha256() -> str:
     return base64.b64encode(hashlib.sha256(report_script().encode()).digest()).decode()
 
 
+def page_style() -> str:
+    """Return the style that all reports share, and the window."""
+    return Path(__file__).with_name("templates").joinpath("page.css").read_text("utf-8")
+
+
 @functools.cache
 def template(name: str) -> Template:
     """Return a page's template, cached because compiling the report's takes as long as an analysis of ten seconds."""
@@ -151,7 +156,7 @@ def template(name: str) -> Template:
     return environment.get_template(name)
 
 
-def _tables(runs: Sequence[Run]) -> Iterator[dict[str, Any]]:
+def tables_of(runs: Sequence[Run]) -> Iterator[dict[str, Any]]:
     """Yield Table 1 in blocks of as many runs as fit side by side on paper."""
     for first in range(0, len(runs), BESIDE):
         some = runs[first : first + BESIDE]
@@ -169,7 +174,7 @@ def _tables(runs: Sequence[Run]) -> Iterator[dict[str, Any]]:
 def _part(index: int, run: Run, charts: Mapping[str, Chart], figures: Figures, stem: str) -> dict[str, Any]:
     """Return everything that the template needs about one run."""
     analysis, quality, given = run.analysis, run.result["quality"], run.result["input"]
-    motion, title = analysis.motion, str(run.recorded.get("title") or given.get("title") or "")
+    title = str(run.recorded.get("title") or given.get("title") or "")
     ordered = [*(name for name in _QUALITY if name in quality), *(name for name in quality if name not in _QUALITY)]
     return {
         "name": run.name,
@@ -185,7 +190,7 @@ def _part(index: int, run: Run, charts: Mapping[str, Chart], figures: Figures, s
         "method": method(analysis),
         "figures": {name: figures.add(chart, stem, index) for name, chart in charts.items()},
         "notices": notices_of(run.result["findings"], charts),
-        "laws": laws_of(motion) if isinstance(motion, Oscillation) else None,
+        "laws": laws_of(analysis),
         "budgets": budgets_of(analysis),
         "effects": analysis.effects,
         "quality": [(_cause(name, analysis.track), quality[name]) for name in ordered],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.analyse import Analysis, Oscillation
+from pipeline.analyse import Analysis
 from pipeline.results.curves import Smoothed
 from pipeline.units import Unit, noun
 
@@ -56,10 +56,9 @@ def amplitude_csv(analysis: Analysis) -> str:
     u of an amplitude is its scatter about a smooth curve; the scale of the distances, which all share, is not in it.
     ``used`` is 0 for amplitudes far from their neighbours, to which no law was fitted.
     """
-    motion = analysis.motion
-    if not isinstance(motion, Oscillation):
+    if (motion := analysis.oscillation) is None:
         return ""
-    windows, scatter, scale = motion.windows, motion.damping.scatter, motion.derived.amplitude_scale
+    windows, scatter, scale = motion.windows, motion.damping.scatter, analysis.derived.amplitude_scale
     u_phase = np.sqrt(windows.covariance[:, 1, 1] * max(motion.phase.reduced_chi2, 1.0))
     table = (windows.t, scale * windows.amplitude, scale * scatter.u, windows.phase, u_phase, scatter.kept)
     word = f"amplitude{_spelt(analysis.track.unit)}"

@@ -18,8 +18,7 @@ from springmass.typeset import prefixed, pretty, pretty_number, typeset, unbroke
 
 def method(analysis: Analysis) -> tuple[str, ...]:
     """Return how the numbers were obtained, in sentences for a lab report; empty if nothing oscillates."""
-    motion = analysis.motion
-    if not isinstance(motion, Oscillation):
+    if (motion := analysis.oscillation) is None:
         return ()
     if is_about(analysis, "solved"):
         sentences = ["The equation of motion was solved and fitted to the samples by least squares."]
@@ -32,7 +31,7 @@ def method(analysis: Analysis) -> tuple[str, ...]:
         sentences.append("Then the whole waveform was fitted to all samples.")
     if not motion.damping.by_statement:
         sentences.append("The damping laws were compared by χ² and by the Bayesian information criterion.")
-    if (mass := motion.derived.effective_mass_kg) is not None:
+    if (mass := analysis.derived.effective_mass_kg) is not None:
         shares = {"spring_mass": "a share of the spring", "added_mass": "the air that the disc carries along"}
         moving = ["the bob", *(shares[x.name] for x in analysis.effects if x.included and x.name in shares)]
         sentences.append(
@@ -56,9 +55,9 @@ NAMED_LAWS = 2  # maximum number of named laws that cannot be ruled out
 
 def damping_sentence(analysis: Analysis) -> str:
     """Return one sentence on the damping law that fits and the status of the others; empty if nothing oscillates."""
-    if not isinstance(analysis.motion, Oscillation):
+    damping, quoted = analysis.damping, analysis.derived.quoted
+    if not damping.fits:
         return ""
-    damping, quoted = analysis.motion.damping, analysis.motion.derived.quoted
     chosen = words_of(damping.best.law)
     used = analysis.track.t[analysis.used]
     span = f"{float(used.max() - used.min()):.0f} s"
@@ -112,12 +111,12 @@ def listed(words: Sequence[str]) -> str:
 
 def summary(analysis: Analysis) -> tuple[tuple[str, str], ...]:
     """Return (title, text) of each part of the summary."""
-    motion, warnings = analysis.motion, [f for f in analysis.findings if f.severity != "info"]
+    motion, warnings = analysis.oscillation, [f for f in analysis.findings if f.severity != "info"]
     ordered = sorted(warnings, key=lambda f: harm_of(f.code, f.severity))
     to_do = ordered[0].advice if ordered else ""
-    if not isinstance(motion, Oscillation):
-        why = sentence(typeset(motion.why))
-        if isinstance(motion, Rest):
+    if motion is None:
+        why = sentence(typeset(analysis.motion.why))
+        if isinstance(analysis.motion, Rest):
             why = "Nothing oscillates in this recording; it gives mean and noise only."
         return (("Result", why), *((("What to do", to_do),) if to_do else ()))
     greatest = _greatest(analysis)
@@ -130,6 +129,7 @@ def summary(analysis: Analysis) -> tuple[tuple[str, str], ...]:
     if (
         "spring_constant" not in analysis.estimates
         and analysis.scene.bob_mass_kg is None
+        and analysis.scene.hangs_on_spring
         and analysis.track.unit == "m"
     ):
         to_do += " For the spring constant, state the mass: --mass-kg KG."

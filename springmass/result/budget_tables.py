@@ -7,7 +7,7 @@ import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pipeline.analyse import Analysis, Oscillation
+from pipeline.analyse import Analysis
 from pipeline.quantities import INPUTS, QUANTITIES
 from pipeline.results.budget import Budget, Contribution
 from springmass.result.table1 import table_estimates
@@ -33,10 +33,7 @@ def budgets_of(analysis: Analysis) -> tuple[BudgetRow, ...]:
 
     Frequencies are omitted, because they share the period's budget.
     """
-    if not isinstance(analysis.motion, Oscillation):
-        return ()
-    budgets = analysis.motion.derived.budgets
-    rows = []
+    budgets, rows = analysis.budgets, []
     for name in dict.fromkeys(key.name for key in table_estimates(analysis)):
         if name in budgets and name not in SAME and budgets[name].contributions:
             every = budgets[name].contributions
@@ -74,9 +71,7 @@ def budget_csv(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
     heads = ["run", "quantity", "input", "type", "value", "u", "unit", "sensitivity", "contribution", "share"]
     writer.writerow(heads)
     for run, analysis in zip(names, analyses, strict=True):
-        if not isinstance(analysis.motion, Oscillation):
-            continue
-        for quantity, budget in analysis.motion.derived.budgets.items():
+        for quantity, budget in analysis.budgets.items():
             for c in budget.contributions:
                 given = ["", "", ""] if c.input is None else [repr(c.input.value), repr(c.input.u), c.input.unit]
                 slope = "" if c.sensitivity is None else repr(c.sensitivity)

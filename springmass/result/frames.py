@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from acquisition.block import Flag
-from pipeline.analyse import Analysis, Oscillation
+from pipeline.analyse import Analysis
 from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
@@ -31,20 +31,19 @@ def estimates_frame(analysis: Analysis, *, correlations: bool = False) -> pd.Dat
     """Return one row per estimate; see :meth:`springmass.Run.to_dataframe`."""
     import pandas as pd
 
-    motion, values = analysis.motion, numbers_of(analysis)
-    derived = motion.derived if isinstance(motion, Oscillation) else None
+    values = numbers_of(analysis)
     by_name = {row.name: row for row in table_rows([analysis])}
     rows: list[dict[str, Any]] = []
     for name, x in values.items():
         row = by_name.get(name)
         words = {"quantity": row.quantity, "symbol": row.symbol} if row else {"quantity": name.replace("_", " ")}
-        budget = None if derived is None else derived.budgets.get(name)
+        budget = analysis.budgets.get(name)
         expanded = {} if budget is None else picked(budget, EXPANDED)
         rows.append({"symbol": "", **words, "value": x.value, "u": x.u, "unit": x.unit, **expanded})
     columns = ["quantity", "symbol", "value", "u", "unit", *EXPANDED]
     frame = pd.DataFrame(rows, index=pd.Index(list(values), name="name"), columns=columns)
-    if correlations and derived is not None:
-        names, matrix = derived.joint.names, derived.joint.correlation
+    if correlations:
+        names, matrix = analysis.derived.joint.names, analysis.derived.joint.correlation
         beside = pd.DataFrame(matrix, index=names, columns=[f"r({name})" for name in names])
         frame = frame.join(beside[[f"r({name})" for name in frame.index]])
     return frame
@@ -88,7 +87,7 @@ def samples_dataset(loaded: Loaded, scene: Scene) -> xr.Dataset:
 
 def run_dataset(loaded: Loaded, analysis: Analysis, name: str) -> xr.Dataset:
     """Return samples, windows and estimates; see :meth:`springmass.Run.to_dataset`."""
-    dataset, track, motion = samples_dataset(loaded, analysis.scene), analysis.track, analysis.motion
+    dataset, track, motion = samples_dataset(loaded, analysis.scene), analysis.track, analysis.oscillation
     of_value, of_first, of_second = (Unit(1, -order).of(track.unit) for order in range(3))
     meanings = " ".join(str(flag.name).lower() for flag in Quality)
     masks = np.array([flag.value for flag in Quality], np.uint8)
@@ -98,7 +97,7 @@ def run_dataset(loaded: Loaded, analysis: Analysis, name: str) -> xr.Dataset:
     left_out = {"flag_masks": masks, "flag_meanings": meanings, "long_name": "why the analysis left a sample out"}
     variables: dict[str, Any] = {"left_out": ("time", analysis.flags, left_out)}
     coordinates: dict[str, Any] = {}
-    if isinstance(motion, Oscillation):
+    if motion is not None:
         fit = {"fit": motion.waveform.position, "residual": motion.waveform.residual, "rest": motion.rest.at(track.t)}
         variables |= {name: ("time", values, {"units": of_value}) for name, values in fit.items()}
         smoothed = smoothed_or_why(analysis)
@@ -125,7 +124,7 @@ def run_dataset(loaded: Loaded, analysis: Analysis, name: str) -> xr.Dataset:
 
 def smoothed_or_why(analysis: Analysis) -> Smoothed | str:
     """Return the smoothed motion, or the reason in words why there is none."""
-    if not isinstance(analysis.motion, Oscillation):
+    if analysis.oscillation is None:
         return "nothing oscillates"
     try:
         return analysis.smoothed()

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
-from pipeline.analyse import Analysis, Oscillation
+from pipeline.analyse import Analysis
 from pipeline.findings.finding import Finding, kinds
 from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.quantities import INPUTS, MODEL_PARTS, QUANTITIES
@@ -56,13 +56,12 @@ def grades_of(analysis: Analysis) -> dict[str, Graded]:
     are certain. It is not to be quoted if an error concerns it, if zero is within two standard uncertainties, or if the
     recording contradicts the law that was stated for it.
     """
-    motion = analysis.motion
-    if not isinstance(motion, Oscillation):
+    if not analysis.damping.fits:
         return {}
     every = numbers_of(analysis)
     doubts = [(finding, doubted_by(finding)) for finding in analysis.findings]
     return {
-        name: Graded((*_doubted(name, doubts), *_of_law(motion, name), *_sized(motion, name, x)))
+        name: Graded((*_doubted(name, doubts), *_of_law(analysis, name), *_sized(analysis, name, x)))
         for name, x in every.items()
     }
 
@@ -85,21 +84,21 @@ def _doubted(name: str, doubts: list[tuple[Finding, frozenset[str]]]) -> Iterato
             yield Reason("do not quote" if finding.severity == "error" else "uncertain", finding.code)
 
 
-def _of_law(motion: Oscillation, name: str) -> Iterator[Reason]:
+def _of_law(analysis: Analysis, name: str) -> Iterator[Reason]:
     """Yield why a quantity that assumes a damping law should not be quoted."""
     of_law = name not in QUANTITIES or QUANTITIES[name].by_law
-    if of_law and motion.damping.by_statement and motion.damping.best.rejected:
+    if of_law and analysis.damping.by_statement and analysis.damping.best.rejected:
         yield Reason("do not quote", "stated_law_rejected", "the recording contradicts the stated law")
-    elif name in motion.derived.coefficients and not motion.derived.quoted:
+    elif name in analysis.derived.coefficients and not analysis.derived.quoted:
         yield Reason("do not quote", "laws_not_separable", "several laws are admissible")
 
 
-def _sized(motion: Oscillation, name: str, x: Estimate) -> Iterator[Reason]:
+def _sized(analysis: Analysis, name: str, x: Estimate) -> Iterator[Reason]:
     """Judge a number by its u; a phase or a rest position has an arbitrary zero, and noise is not a result."""
     if isinstance(x, UpperLimit):
         yield Reason("sound", "upper_limit", "as an upper limit")
     elif name not in ("phase", "offset", "noise") and x.u > UNCERTAIN * abs(x.value):
-        greatest = motion.derived.budgets[name].contributions[0].name
+        greatest = analysis.budgets[name].contributions[0].name
         label = INPUTS[greatest].label
         if x.u > MEANINGLESS * abs(x.value):
             share = f"u is {100.0 * x.u / abs(x.value):.0f} % of it: " if x.value else ""
@@ -126,7 +125,7 @@ def all_sound(graded: Mapping[str, Graded]) -> bool:
     return bool(graded) and all(of_value.grade == "sound" for of_value in graded.values())
 
 
-def grades_text(analysis: Analysis, *, page: bool = False) -> str:
+def grades_text(analysis: Analysis, *, page: bool) -> str:
     """Return the symbols of Table 1 in groups: sound, uncertain and not to be quoted, each with its reason."""
     by_name = grades_of(analysis)
     groups: dict[Grade, dict[str, list[str]]] = {grade: {} for grade in GRADES}

@@ -6,17 +6,17 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from pipeline.analyse import Oscillation
+from pipeline.analyse import Analysis
 from pipeline.damping.select import Damping
 from pipeline.numerics.estimate import Estimate
 from pipeline.several.joint import JointDamping
 from springmass.typeset import equation, law_status, pretty_number, typeset
 
 
-def laws_of(motion: Oscillation) -> dict[str, Any]:
+def laws_of(analysis: Analysis) -> dict[str, Any]:
     """Return the rows of all laws fitted to one run, and the reasons why other laws were not fitted."""
-    damping = motion.damping
-    fitted = {law: motion.derived.parameters_of(fit) for law, fit in damping.fits.items()}
+    damping = analysis.damping
+    fitted = {law: analysis.derived.parameters_of(fit) for law, fit in damping.fits.items()}
     laws = _laws(damping, fitted, lambda law: law_status(damping, law))
     return {**laws, "unfitted": [(law, typeset(why)) for law, why in damping.unfitted.items()]}
 
@@ -35,14 +35,13 @@ def _laws(
     damping: Damping | JointDamping, fitted: Mapping[str, Mapping[str, Estimate]], status: Callable[[str], str]
 ) -> dict[str, Any]:
     """Return one row per fitted law: goodness of fit, status and coefficients."""
-    chi2 = damping.best.reduced_chi2 * damping.best.dof
     rows = [
         {
             "name": law,
             "status": status(law),
             "look": "rejected" if fit.rejected else "selected" if law == damping.selected else "",
             "fit": fit,
-            "chi2": _difference(fit.reduced_chi2 * fit.dof - chi2),
+            "chi2": _difference(fit.reduced_chi2 * fit.dof - damping.best.reduced_chi2 * damping.best.dof),
             "bic": _difference(fit.bic - damping.best.bic),
             "coefficients": [equation(name, x) for name, x in fitted[law].items()],
         }

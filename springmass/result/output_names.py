@@ -5,8 +5,8 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Collection, Sequence
+from pathlib import Path, PurePosixPath
 
 from springmass.errors import ProgramError
 from springmass.layout import STDIN
@@ -25,6 +25,21 @@ def safe_name(text: str, mark: str = "_", *, longest: int = 60) -> str:
     """
     safe = re.sub(r"(?:[^\w.+-]|_)+", mark, text).strip(f"{mark}.")
     return safe.encode()[:longest].decode(errors="ignore")
+
+
+def plain_name(name: str, taken: Collection[str] = ()) -> str:
+    """Return the name of a foreign file for a folder of ours: no path, no hidden file, none that is taken.
+
+    >>> plain_name("../a b/run 1.txt"), plain_name("run.txt", ["run.txt"]), plain_name("..")
+    ('run_1.txt', '2-run.txt', 'recording')
+    """
+    last = PurePosixPath(name.replace("\\", "/")).name
+    stem, dot, suffix = last.rpartition(".")
+    safe = safe_name(stem or suffix, longest=100) or "recording"
+    named, count = f"{safe}.{safe_name(suffix, longest=20)}".rstrip(".") if stem and dot else safe, 2
+    while (free := named if count == 2 else f"{count - 1}-{named}") in taken:
+        count += 1
+    return free
 
 
 def results_name(path: Path, *, run: str | None = None, channel: str | None = None) -> str:

@@ -11,7 +11,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any
 
 from acquisition.recordings.recording import FormatIssue
-from pipeline.analysis import Analysis, Oscillation
+from pipeline.analysis import Analysis
 from pipeline.findings.finding import UNKNOWN_CODE, Finding, by_severity, kinds, word
 from pipeline.notice import Notice
 from pipeline.numerics.estimate import Estimate, UpperLimit
@@ -45,13 +45,13 @@ def rejected(findings: Sequence[Mapping[str, str]]) -> list[str]:
 
 def details_of(analysis: Analysis) -> Mapping[str, Any]:
     """Return budgets, correlations, damping and grades, which are empty for a motion that does not oscillate."""
-    motion = analysis.motion
-    if not isinstance(motion, Oscillation):
+    if not analysis.damping.fits:
         return NO_DETAILS
+    joint = analysis.derived.joint
     return {
-        "budget": _budgets(motion),
-        "correlations": _correlations(motion),
-        "damping": _damping(motion),
+        "budget": _budgets(analysis),
+        "correlations": {"names": joint.names, "matrix": joint.correlation.round(6)},
+        "damping": _damping(analysis),
         "grades": grades_json(analysis),
     }
 
@@ -109,14 +109,14 @@ def _sentence(clause: str) -> str:
     return (clause[0].upper() + clause[1:] if first.isalpha() else clause) + end
 
 
-def _budgets(motion: Oscillation) -> dict[str, Any]:
+def _budgets(analysis: Analysis) -> dict[str, Any]:
     return {
         name: {
             **plain(budget.estimate),
             **plain(picked(budget, EXPANDED)),
             "inputs": [_contribution(c) for c in budget.contributions],
         }
-        for name, budget in motion.derived.budgets.items()
+        for name, budget in analysis.budgets.items()
     }
 
 
@@ -126,13 +126,8 @@ def _contribution(c: Contribution) -> dict[str, Any]:
     return {"name": c.name, "type": c.kind, **given, **numbers}
 
 
-def _correlations(motion: Oscillation) -> dict[str, Any]:
-    joint = motion.derived.joint
-    return {"names": joint.names, "matrix": joint.correlation.round(6)}
-
-
-def _damping(motion: Oscillation) -> dict[str, Any]:
-    damping, derived = motion.damping, motion.derived
+def _damping(analysis: Analysis) -> dict[str, Any]:
+    damping, derived = analysis.damping, analysis.derived
     keys, coefficients = ("reduced_chi2", "dof", "bic", "rejected", "rejection"), parameters_json(derived.coefficients)
     laws = {
         name: {"parameters": parameters_json(derived.parameters_of(fit)), **picked(fit, keys)}

@@ -9,7 +9,8 @@ from html import escape
 import numpy as np
 
 from acquisition.errors import visible
-from pipeline.analyse import Analysis, Oscillation, Rest, TwoModes
+from pipeline.analyse import Analysis
+from pipeline.damping.select import Damping
 from springmass.result.law_rows import laws_of
 from springmass.result.table1 import table_rows
 from springmass.typeset import law_status, pretty, pretty_number
@@ -30,8 +31,8 @@ def text_summary(analysis: Analysis, name: str) -> str:
     lines = [_cut(visible(_head(analysis, name)))]
     width = max((len(row.quantity) for row in shown), default=0) + 2
     lines += [f"  {row.quantity:{width}}{row.symbol:8}{row.estimates[0]!r}" for row in shown]
-    if isinstance(analysis.motion, Oscillation):
-        lines.append(_cut(f"damping: {_law(analysis.motion)}"))
+    if analysis.damping.fits:
+        lines.append(_cut(f"damping: {_law(analysis.damping)}"))
     lines.append(_cut(_findings(analysis)))
     hidden = len(rows) - len(shown)
     lines.append("to_dataframe() has all estimates" + (f" ({hidden} more)" if hidden else "") + ", plot() the run")
@@ -40,7 +41,6 @@ def text_summary(analysis: Analysis, name: str) -> str:
 
 def html_summary(analysis: Analysis, name: str) -> str:
     """Return a run as an HTML fragment without scripts: estimates, laws and findings."""
-    motion = analysis.motion
     rows = [
         f"<tr><td>{escape(row.quantity)}</td><td><i>{_subscript(row.page_symbol)}</i></td>"
         f"<td>{escape(pretty(row.estimates[0]))}</td></tr>"
@@ -51,16 +51,16 @@ def html_summary(analysis: Analysis, name: str) -> str:
         "<table><thead><tr><th>quantity</th><th>symbol</th><th>estimate</th></tr></thead>"
         f"<tbody>{''.join(rows)}</tbody></table>",
     ]
-    if isinstance(motion, Oscillation):
+    if analysis.damping.fits:
         fits = [
             f"<tr><td>{escape(row['name'])}</td><td>{escape(row['status'])}</td>"
             f"<td>{pretty_number(row['fit'].reduced_chi2, 3)}</td><td>{escape(row['bic'])}</td>"
             f"<td>{escape(', '.join(row['coefficients'][1:]))}</td></tr>"
-            for row in laws_of(motion)["rows"]
+            for row in laws_of(analysis)["rows"]
         ]
         heads = "<th>law</th><th>status</th><th>reduced χ²</th><th>ΔBIC</th><th>coefficients</th>"
         parts.append(
-            f"<details><summary>Damping: {escape(_law(motion))}</summary>"
+            f"<details><summary>Damping: {escape(_law(analysis.damping))}</summary>"
             f"<table><thead><tr>{heads}</tr></thead><tbody>{''.join(fits)}</tbody></table></details>"
         )
     items = "".join(
@@ -77,11 +77,10 @@ def _head(analysis: Analysis, name: str) -> str:
     span = float(np.nanmax(track.t) - np.nanmin(track.t))
     words = f"{name or 'run'}: {track.kind}, {len(track)} samples in {span:.4g} s, "
     words += f"{analysis.quality['used']} used"
-    return f"{words}; {analysis.motion.why}" if isinstance(analysis.motion, Rest | TwoModes) else words
+    return words if analysis.ok else f"{words}; {analysis.motion.why}"
 
 
-def _law(motion: Oscillation) -> str:
-    damping = motion.damping
+def _law(damping: Damping) -> str:
     others = [name for name in damping.possible if name != damping.selected]
     if damping.by_statement:
         return f"{damping.selected} ({law_status(damping, damping.selected)})"

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from pipeline.analyse import Analysis, Oscillation
+from pipeline.analyse import Analysis
 from pipeline.damping.laws import LAWS
 from pipeline.findings.finding import kinds
 from pipeline.numerics.estimate import Estimate
@@ -77,17 +77,15 @@ def is_about(analysis: Analysis, subject: str) -> bool:
 
 
 def _shown_estimates(analysis: Analysis) -> dict[TableKey, Estimate]:
-    motion = analysis.motion
-    if not isinstance(motion, Oscillation):
-        return {TableKey(name): analysis.estimates[name] for name in _IN_TABLE if name in analysis.estimates}
-    derived = motion.derived
-    law, certain = derived.law_of_coefficients, bool(motion.damping.admissible) or motion.damping.by_statement
+    derived, damping = analysis.derived, analysis.damping
+    law, certain = derived.law_of_coefficients, bool(damping.admissible) or damping.by_statement
     # A coefficient of a user-defined law is not one of these quantities, even if it has the same name.
     coefficients = derived.coefficients if derived.quoted and law in LAWS else {}
     shown = {}
     for name in _IN_TABLE:
         if name in derived.estimates:
-            key = TableKey(name, derived.law, bool(derived.law)) if QUANTITIES[name].by_law else TableKey(name)
+            by_law = QUANTITIES[name].by_law and derived.laws
+            key = TableKey(name, derived.law, bool(derived.law)) if by_law else TableKey(name)
             shown[key] = derived.estimates[name]
         elif name in coefficients:
             shown[TableKey(name, law, certain, law)] = coefficients[name]
@@ -141,23 +139,19 @@ def _needs_mass(run: Analysis) -> bool:
     column = table_estimates(run)
     amplitude = column.get(TableKey("amplitude"))
     of_length = TableKey("period") in column and amplitude is not None and amplitude.unit == "m"
-    return of_length and run.scene.bob_mass_kg is None
+    return of_length and run.scene.bob_mass_kg is None and run.scene.hangs_on_spring
 
 
 def numbers_of(analysis: Analysis) -> Mapping[str, Estimate]:
     """Return all estimates of a run and the coefficients of the selected law, by name."""
-    motion = analysis.motion
-    law = motion.derived.coefficients if isinstance(motion, Oscillation) else {}
-    return {**analysis.estimates, **law}
+    return {**analysis.estimates, **analysis.derived.coefficients}
 
 
 def _every_number(analysis: Analysis) -> dict[str, Estimate]:
     """Return every estimate of a run, and every law's parameters under names ``LAW.PARAMETER``."""
     everything = dict(analysis.estimates)
-    if isinstance(analysis.motion, Oscillation):
-        derived = analysis.motion.derived
-        for law, fit in analysis.motion.damping.fits.items():
-            everything |= {f"{law}.{name}": x for name, x in derived.parameters_of(fit).items()}
+    for law, fit in analysis.damping.fits.items():
+        everything |= {f"{law}.{name}": x for name, x in analysis.derived.parameters_of(fit).items()}
     return everything
 
 

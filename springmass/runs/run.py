@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from acquisition.recordings.recording import FormatIssue
-from pipeline.analyse import Analysis, Oscillation, Relaxation, analyse
+from pipeline.analyse import Analysis, Measured, conclude, measure, of_samples
 from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError
 from pipeline.findings.finding import Finding
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import Classic, classic
-from pipeline.track import Track
 from springmass.errors import LOG
 from springmass.loading.arrays import loaded_of, refuse_reading
 from springmass.loading.load import load
@@ -103,7 +101,8 @@ class Run(Mapping[str, Estimate]):
     def named(self, name: str, **changes: Any) -> Run:
         """Return the run under another name, and with other fields, with its analysis if it has one."""
         other = replace(self, name=name, **changes)
-        vars(other).update({each: vars(self)[each] for each in ("analysis", "classic") if each in vars(self)})
+        kept = ("measured", "analysis", "classic")
+        vars(other).update({each: vars(self)[each] for each in kept if each in vars(self)})
         return other
 
     @cached_property
@@ -118,7 +117,20 @@ class Run(Mapping[str, Estimate]):
         if self.name:  # without one, the samples are arrays, or those so far of a recording
             with_scene = f"with a scene that states {stated_keys(self.scene)}"
             LOG.debug(f"analysed: {self.name} at {self.how.accuracy}, {with_scene}")
-        return analyse_track(self.loaded.track, self.scene, self.how, self.loaded.traps)
+        analysis = conclude(self.measured, self.scene)
+        return replace(analysis, findings=with_traps(analysis.findings, self.loaded.traps))
+
+    @cached_property
+    def measured(self) -> Measured:
+        """What follows from the samples, whatever the bench weighs."""
+        return measure(self.loaded.track, self.scene, self.how.options)
+
+    def on_bench(self, scene: Scene) -> Run:
+        """Return the run with another scene; what follows from the samples alone is not calculated again."""
+        other = replace(self, stated=scene)
+        if "measured" in vars(self) and of_samples(scene) == of_samples(self.scene):
+            vars(other)["measured"] = self.measured
+        return other
 
     @cached_property
     def classic(self) -> Classic | None:
@@ -147,18 +159,17 @@ class Run(Mapping[str, Estimate]):
     @property
     def ok(self) -> bool:
         """Whether the run oscillates or relaxes, so that there is something to report."""
-        return isinstance(self.analysis.motion, Oscillation | Relaxation)
+        return self.analysis.ok
 
     @property
     def why(self) -> str:
         """Why the run is not ``ok``, as a sentence; empty if it is."""
-        return "" if isinstance(self.analysis.motion, Oscillation | Relaxation) else self.analysis.motion.why
+        return "" if self.ok else self.analysis.motion.why
 
     @property
     def law(self) -> str | None:
         """The name of the damping law that fits best or is stated; None without an oscillation."""
-        motion = self.analysis.motion
-        return motion.damping.selected if isinstance(motion, Oscillation) else None
+        return self.analysis.damping.selected or None
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -176,7 +187,7 @@ class Run(Mapping[str, Estimate]):
         return table_rows([self.analysis])
 
     def __getitem__(self, name: str) -> Estimate:
-        everything, motion = numbers_of(self.analysis), self.analysis.motion
+        everything, fits = numbers_of(self.analysis), self.analysis.damping.fits
         if name in everything:
             return everything[name]
         for row in self.rows:
@@ -184,8 +195,8 @@ class Run(Mapping[str, Estimate]):
             if estimate is not None and name in (row.symbol, row.on_screen):
                 return estimate
         law, _, parameter = name.partition(".")
-        if isinstance(motion, Oscillation) and law in motion.damping.fits:
-            parameters = motion.derived.parameters_of(motion.damping.fits[law])
+        if law in fits:
+            parameters = self.analysis.derived.parameters_of(fits[law])
             if parameter in parameters:
                 return parameters[parameter]
         if name in ("spring_constant", "k") and self.scene.bob_mass_kg is None and "period" in everything:
@@ -227,7 +238,7 @@ class Run(Mapping[str, Estimate]):
             raise AnalysisError(f"no chart {chart!r}", f"there are {', '.join(CHARTS)}")
         drawn = CHARTS[chart](self.analysis)
         if drawn is None:
-            if not isinstance(self.analysis.motion, Oscillation):
+            if self.analysis.oscillation is None:
                 raise AnalysisError(f"only its position can be drawn, nothing oscillates: {self.analysis.motion.why}")
             needs = (
                 "[bob] mass_kg, [disc] diameter_m and an amplitude that falls" if chart == "drag" else "more periods"
@@ -295,12 +306,6 @@ class Run(Mapping[str, Estimate]):
 
     def _repr_html_(self) -> str:
         return html_summary(self.analysis, self.name)
-
-
-def analyse_track(track: Track, scene: Scene, how: AnalysisOptions, traps: Sequence[FormatIssue]) -> Analysis:
-    """Analyse samples; the findings include what their reader noticed."""
-    analysis = analyse(track, scene, how.options)
-    return replace(analysis, findings=with_traps(analysis.findings, traps))
 
 
 class _NoValue(KeyError):

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, TypeVar
 
 from acquisition.errors import AcquisitionError, NeedsAnswer
 from pipeline.bench.scene import Scene
@@ -15,6 +15,8 @@ from springmass.loading.options import ANALYSIS_DEFAULTS, AnalysisOptions
 from springmass.loading.scenes import Amendments, amended
 from springmass.runs.run import Run
 from storage.errors import StorageError
+
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,27 +42,36 @@ class Failed:
 def analyse_all(tasks: Iterable[Task]) -> Iterator[Run | Failed]:
     """Yield the analysed run of each recording, or why there is none; a failure does not stop the others."""
     for task in tasks:
-        where = task.source if isinstance(task.source, str | os.PathLike) else task.name or type(task.source).__name__
-        try:
+
+        def analysed(task: Task = task) -> Run:
             run = Run.of(task.source, task.scene, task.how, task.name)
             if task.values:
                 run = replace(run, stated=amended(run.scene, task.values, where="the command line"))
             _ = run.analysis
-            yield run
-        except NeedsAnswer as error:
-            yield Failed(task, _unreadable(error, error.where), error)
-        except ProgramError as error:
-            yield Failed(task, error)
-        except (AcquisitionError, StorageError) as error:
-            yield Failed(task, _unreadable(error, error.where))
-        except PipelineError as error:
-            yield Failed(task, _unreadable(error, f"{where}: "))
-        except OSError as error:
-            yield Failed(task, ProgramError(f"{where}: {error}", exit_code=UNREADABLE))
-        except MemoryError:
-            yield Failed(task, ProgramError(f"{where}: {NO_MEMORY}", exit_code=UNREADABLE))
-        except Exception as error:  # a defect that one recording meets must not keep the others from their results
-            yield Failed(task, ProgramError(f"{where}: {internal_error(error)}", exit_code=INTERNAL))
+            return run
+
+        yield attempted(task, analysed)
+
+
+def attempted(task: Task, make: Callable[[], Made]) -> Made | Failed:
+    """Return what is made of a recording, or why it cannot be made."""
+    where = task.source if isinstance(task.source, str | os.PathLike) else task.name or type(task.source).__name__
+    try:
+        return make()
+    except NeedsAnswer as error:
+        return Failed(task, _unreadable(error, error.where), error)
+    except ProgramError as error:
+        return Failed(task, error)
+    except (AcquisitionError, StorageError) as error:
+        return Failed(task, _unreadable(error, error.where))
+    except PipelineError as error:
+        return Failed(task, _unreadable(error, f"{where}: "))
+    except OSError as error:
+        return Failed(task, ProgramError(f"{where}: {error}", exit_code=UNREADABLE))
+    except MemoryError:
+        return Failed(task, ProgramError(f"{where}: {NO_MEMORY}", exit_code=UNREADABLE))
+    except Exception as error:  # a defect that one recording meets must not keep the others from their results
+        return Failed(task, ProgramError(f"{where}: {internal_error(error)}", exit_code=INTERNAL))
 
 
 def _unreadable(error: Error, where: str) -> ProgramError:

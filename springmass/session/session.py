@@ -44,6 +44,7 @@ from storage.wire_log.scanning import LogContents
 if TYPE_CHECKING:
     from springmass.runs.run import Run
 
+U_RULER_M = 0.5e-3  # of a distance by a ruler
 HEAR_S = 3.0  # silence before a run after which the sensor counts as absent
 START_S = 12.0  # time that a board may take to start: Wi-Fi, calibration, a banner
 HEARD = 3  # number of readings after which a sensor counts as heard
@@ -189,7 +190,7 @@ class Session:
             raise ProgramError(problem, "close that program", SENSOR)
         raise self.sensors[channel].not_heard(self._tee.heard(channel))
 
-    def still(self, seconds: float = 3.0) -> StillPoint:
+    def still(self, seconds: float) -> StillPoint:
         """Return rest position and noise from the first sensor's next seconds, during which the bob must hang still."""
         self.poll(0.0)  # discard earlier samples, which belong to another rest position or to a motion
         distances: list[np.ndarray[Any, Any]] = []
@@ -198,13 +199,13 @@ class Session:
             distances += [block.distance for channel, block in self.poll(0.05) if channel == 0]
         return from_still(np.concatenate(distances) if distances else np.empty(0))
 
-    def calibrate(self, points: Sequence[StillPoint], known_m: Sequence[float], u_known_m: float) -> StillPoint:
-        """Calibrate the first sensor with known distances; return the last still point in the new calibration.
+    def calibrate(self, points: Sequence[StillPoint], known_m: Sequence[float]) -> StillPoint:
+        """Calibrate the first sensor with distances by a ruler; return the last still point in the new calibration.
 
-        One known distance sets the offset; two or more also set the scale.
+        One distance sets the offset; two or more also set the scale.
         """
         before = self.sensors[0].calibration
-        calibration = against_ruler(tuple(points), tuple(known_m), u_known_m, before)
+        calibration = against_ruler(tuple(points), tuple(known_m), U_RULER_M, before)
         self.sensors[0] = replace(self.sensors[0], calibration=calibration)
         self._chains[0].calibration = calibration
         self.poll(0.0)  # discard samples decoded with the earlier calibration

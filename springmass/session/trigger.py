@@ -19,7 +19,7 @@ class Trigger:
     """The run starts when the first sensor's distance leaves its rest position; it keeps the time before that."""
 
     threshold_m: float
-    keep_s: float = 2.0
+    keep_s: float
 
 
 class Watch:

@@ -12,10 +12,9 @@ from pipeline.bench.scene import Scene
 from pipeline.dynamics.equation import Problem
 from pipeline.dynamics.strang import STRANG
 from pipeline.simulation import Trajectory
-from springmass.simulations.simulation import prepare
+from springmass.simulations.simulation import FINE, prepare
 
 REST_M = 0.25  # height of the bob's rest position above the sensor, m
-STEPS_A_RADIAN = 24  # steps per radian; interpolation between them has an error of 1e-8 of the amplitude
 STRETCH_STEPS = 2000  # number of steps solved at a time, when the recording needs them
 EXAMPLE = Scene.from_mapping(
     {
@@ -59,7 +58,7 @@ def bench_position(
     '0.200000'
     """
     problem = prepare(scene, seconds, where=where).problem
-    step_s = 1.0 / (STEPS_A_RADIAN * problem.equation.angular_frequency_per_s)
+    step_s = 1.0 / (FINE * problem.equation.angular_frequency_per_s)
     solved: list[Trajectory] = []
 
     def position(t: float) -> float:

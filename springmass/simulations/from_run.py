@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.analysis import Analysis, Oscillation
+from pipeline.analyse import Analysis, Oscillation
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.track import F8
@@ -17,7 +17,7 @@ from springmass.errors import UNREADABLE, ProgramError
 SCENE_KEYS = {"gamma": "gamma_per_s", "beta": "beta_per_m_s", "mu": "mu_m_per_s"}
 
 
-def scene_from_run(scene: Scene, analysis: Analysis, *, damping: bool = True) -> tuple[Scene, Joint]:
+def scene_from_run(scene: Scene, analysis: Analysis, *, damping: bool) -> tuple[Scene, Joint]:
     """Return a scene completed with values from a run's analysis, and the joint distribution of those values.
 
     The start is always taken from the run, because nobody releases a bob exactly at the first sample; the damping only
@@ -67,11 +67,11 @@ def scene_from_run(scene: Scene, analysis: Analysis, *, damping: bool = True) ->
 
 def oscillation_of(analysis: Analysis) -> Oscillation:
     """Return the oscillation of a run; refuse a run without one."""
-    if not isinstance(analysis.motion, Oscillation):
+    if (motion := analysis.oscillation) is None:
         raise ProgramError(
             f"{analysis.motion.why}: nothing to lay a prediction over", "name a run that oscillates", UNREADABLE
         )
-    return analysis.motion
+    return motion
 
 
 def _covariance(motion: Oscillation) -> F8:

@@ -8,13 +8,13 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from acquisition.errors import visible
-from pipeline.analyse import Analysis, Oscillation
+from pipeline.analyse import Analysis
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import Classic
 from pipeline.several.compare import Comparison
 from springmass.comparing.reported import Reported
 from springmass.result.table1 import rows_and_needs
-from springmass.terminal.style import PLAIN, TerminalStyle, concise, shown
+from springmass.terminal.style import TerminalStyle, concise, shown
 from springmass.typeset import count
 
 _MARKS = {"error": "ERROR  ", "warning": "warning", "info": "note   "}
@@ -65,7 +65,7 @@ def _finding_line(finding: Mapping[str, Any], written: Callable[[str], str]) -> 
     return "\n".join([*lines[: WARNING_LINES - 1], f"{last[: NARROW - 4].rstrip(' .,;')} ..."])
 
 
-def shared_findings_text(runs: Mapping[str, Sequence[Mapping[str, Any]]], written: Callable[[str], str] = str) -> str:
+def shared_findings_text(runs: Mapping[str, Sequence[Mapping[str, Any]]], written: Callable[[str], str]) -> str:
     """Return the errors and warnings of several runs by name, one paragraph per code, and the number of notes."""
     grave: dict[str, dict[str, Mapping[str, Any]]] = {}
     notes = 0
@@ -97,7 +97,7 @@ def classic_text(classic: Classic) -> str:
     return "\n".join([*lines, f"  {'chi-square of its fit':<22} {classic.chi2:.4g}"])
 
 
-def comparison_text(comparison: Comparison, analyses: Sequence[Analysis], style: TerminalStyle = PLAIN) -> str:
+def comparison_text(comparison: Comparison, analyses: Sequence[Analysis], style: TerminalStyle) -> str:
     """Return a comparison as an aligned table, followed by its message; on a terminal with digits in parentheses."""
 
     def form(estimate: Estimate | None) -> str:
@@ -105,8 +105,8 @@ def comparison_text(comparison: Comparison, analyses: Sequence[Analysis], style:
 
     rows = [("period", "mass that swings", "spring constant", "residual / u")]
     for analysis, k, pull in zip(analyses, comparison.each, comparison.pulls, strict=True):
-        mass = analysis.motion.derived.effective_mass_kg if isinstance(analysis.motion, Oscillation) else None
-        rows.append((form(analysis.estimates["period"]), form(mass), form(k), f"{pull:+.1f}"))
+        period, mass = analysis.estimates["period"], analysis.derived.effective_mass_kg
+        rows.append((form(period), form(mass), form(k), f"{pull:+.1f}"))
     # Constants that disagree have no meaningful mean.
     mean = form(comparison.spring_constant) if comparison.agree else "none"
     rows.append(("", "", mean, f"chi2 {comparison.chi2:.3g} / {comparison.dof}"))
@@ -119,7 +119,7 @@ def comparison_text(comparison: Comparison, analyses: Sequence[Analysis], style:
     return f"{table}\n\n{wrapped(comparison.message)}"
 
 
-def reported_text(rows: Sequence[Reported], style: TerminalStyle = PLAIN) -> str:
+def reported_text(rows: Sequence[Reported], style: TerminalStyle) -> str:
     """Return printed values beside those of this analysis, with the verdict on each."""
     lines = [("printed", "of", "value", "this analysis", "verdict")]
     for row in rows:
@@ -148,7 +148,7 @@ def visible_lines(text: str) -> str:
 NAME_WIDTH, LEAST_NAME_WIDTH = 24, 12  # of the column of quantities, which wrap, for several runs and for one
 
 
-def text_table(names: Sequence[str], runs: Sequence[Analysis], style: TerminalStyle = PLAIN) -> str:
+def text_table(names: Sequence[str], runs: Sequence[Analysis], style: TerminalStyle) -> str:
     """Return Table 1 in aligned columns; runs that do not fit side by side follow in another block.
 
     Names that are wider than their column are shortened. If the runs do not fit side by side, the uncertainty is given

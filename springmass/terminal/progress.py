@@ -28,13 +28,16 @@ def counting(what: str, total: int, *, lines: bool = False) -> Iterator[Callable
     """
     if not (LOG.isEnabledFor(logging.INFO) and watched(sys.stderr)):
         began_s = shown_s = time.monotonic()
+        began = 0
 
         def write(done: int) -> None:
-            nonlocal shown_s
+            nonlocal shown_s, began_s, began
             now_s = time.monotonic()
-            if lines and 0 < done < total and now_s - shown_s >= EVERY_S:
+            if not began:  # the first items take as long as the worker processes take to start
+                began_s, began = now_s, done
+            elif lines and began < done < total and now_s - shown_s >= EVERY_S:
                 shown_s = now_s
-                left_s = (now_s - began_s) * (total - done) / done
+                left_s = (now_s - began_s) * (total - done) / (done - began)
                 LOG.info(f"{what} {done}/{total}, {timedelta(seconds=round(left_s))} left")
 
         yield write

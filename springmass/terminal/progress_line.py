@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from pipeline.analyse import Oscillation
 from springmass.runs.rolling import NotYet
 from springmass.session.live_state import Progress, TroubleKind
 from springmass.terminal.console import Console
-from springmass.terminal.style import PLAIN, TerminalStyle, concise, shown
+from springmass.terminal.style import TerminalStyle, concise, shown
 
 # Without a terminal, one of this many lines is printed: the motion for each would add a tenth to the recording's cost.
 UNWATCHED_LINES = 30
@@ -21,7 +20,7 @@ class ProgressLine:
     With ``keys``, marks can be typed.
     """
 
-    def __init__(self, console: Console, style: TerminalStyle = PLAIN, *, keys: bool = False) -> None:
+    def __init__(self, console: Console, style: TerminalStyle, *, keys: bool) -> None:
         self._console, self._style = console, style
         self._help = "space marks, Ctrl-C stops" if keys else "Ctrl-C stops"
         self._turns = 0
@@ -64,11 +63,11 @@ def _parts(progress: Progress, style: TerminalStyle) -> list[str]:
     motion = NotYet("listening") if listening else progress.motion()
     if isinstance(motion, NotYet):
         parts.append(motion.why)
-    elif isinstance(oscillation := motion.analysis.motion, Oscillation):
+    elif motion.analysis.oscillation is not None:
         form, estimates = concise if style.terminal else shown, motion.analysis.estimates
         parts += [f"T {form(estimates['period'], style)}", f"A {form(estimates['amplitude'], style)}"]
     else:
-        parts.append(oscillation.why)
+        parts.append(motion.analysis.motion.why)
     parts.append(f"{progress.rate_hz:.0f} Hz")
     parts.append(f"{progress.missing} missing" + (f", {progress.gaps} gaps" if progress.gaps else ""))
     if progress.status is not None:

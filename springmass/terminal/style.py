@@ -6,7 +6,7 @@ import os
 from dataclasses import dataclass
 from typing import TextIO
 
-from pipeline.numerics.estimate import Estimate, format_value, in_brackets
+from pipeline.numerics.estimate import Estimate
 from springmass.typeset import prefixed, pretty
 
 WIDEST = 100
@@ -20,9 +20,6 @@ class TerminalStyle:
     unicode: bool = False  # can show ± and superscripts
     si: bool = True  # quantities in SI units without prefixes
     width: int = WIDEST
-
-
-PLAIN = TerminalStyle()
 
 
 def style_of(stream: TextIO, *, si: bool = False) -> TerminalStyle:
@@ -51,7 +48,7 @@ def shown(estimate: Estimate | None, style: TerminalStyle, *, brackets: bool = F
         return "-"
     chosen = estimate if style.si else prefixed(estimate)
     if style.unicode:
-        return pretty(chosen, in_brackets if brackets else format_value)
+        return pretty(chosen, brackets=brackets)
     return (repr(chosen) if brackets else str(chosen)).replace("µ", "u")
 
 

@@ -7,7 +7,6 @@ import errno
 import io
 import os
 import secrets
-import sys
 import threading
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
@@ -17,10 +16,8 @@ from typing import NamedTuple, Protocol
 
 from storage.atomic import sync_folder
 from storage.errors import RunExists, WriteFailed, one_line
+from storage.locks import lock
 from storage.wire_log.records import LogHeader, RecordKind, frame
-
-if sys.platform != "win32":
-    import fcntl
 
 
 class LogFile(Protocol):
@@ -44,9 +41,8 @@ class _NewFile(io.FileIO):
 
     def __init__(self, path: Path) -> None:
         super().__init__(path, "x", opener=lambda name, flags: os.open(name, flags | os.O_APPEND, 0o666))
-        if sys.platform != "win32":
-            with contextlib.suppress(OSError):  # a network disk without locks
-                fcntl.flock(self.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+        with contextlib.suppress(BlockingIOError):  # somebody looks whether it is locked
+            lock(self.fileno())
 
     def sync(self) -> None:
         self._sync(self.fileno())

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from acquisition.regular_file import open_regular
 from storage.errors import NotALog, one_line
+from storage.locks import is_locked
 from storage.schema import ValueRefused
 from storage.wire_log.records import (
     LONGEST_RECORD,
@@ -185,14 +186,7 @@ class LogContents:
 
         False on Windows and on a disk without locks, where this is unknown.
         """
-        try:
-            import fcntl
-
-            fcntl.flock(self._file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-            fcntl.flock(self._file, fcntl.LOCK_UN)
-        except (ImportError, OSError) as error:
-            return isinstance(error, BlockingIOError)
-        return False
+        return is_locked(self._file)
 
     def remove(self) -> bool:
         """Remove the log unless it has grown or its name leads to another file; return whether it was removed."""

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from springmass.cli import main
+from springmass.course.results_csv import write_rows
 from tests.courses import faulty_course, write_recording
 
 K, SPRING_KG, DIAMETER_M, RHO = 14.0, 0.010, 0.102, 1.199  # N/m, kg, m, kg/m3
@@ -112,3 +113,49 @@ def test_every_group_is_told_of_its_faults(faulty):
     assert {run for look, run in looks if look != "fine"} == {"A1", "A3", "B2", "C3", "D2", "E1", "E3", "F2", "F4"}
     assert [look for look, _ in looks[9:]] == ["fine"] * 15
     assert "A1 and A3 exchanged" in page
+
+
+def bench_rows(spread: float, exchanged: tuple[str, str], *, runs_of_bench: int) -> list[dict[str, object]]:
+    """Return results of twelve benches, each with its own spring, bare and with a disc, and one exchange of files."""
+    rng, rows = np.random.default_rng(5), dict[str, dict[str, object]]()
+    for bench in range(12):
+        k, bare_kg = 14.0 * (1.0 + spread * rng.standard_normal()), rng.uniform(0.18, 0.225)
+        for disc_kg in (0.0, 0.0169)[-runs_of_bench:]:
+            mass = bare_kg + disc_kg
+            omega = math.sqrt(k / (mass + SPRING_KG / 3.0)) * (1.0 + 2e-5 * rng.standard_normal())
+            name = f"G{bench}_{'disc' if disc_kg else 'bare'}"
+            numbers = {"natural_angular_frequency": omega, "own_mass_kg": mass, "spring_mass_kg": SPRING_KG}
+            rows[name] = {"run": name, "path": f"{name}.txt", "status": "ok", "unit": "m", "clock": "device",
+                          "u_clock": 2.9e-5, "group": f"{bench:02d}", **numbers}  # fmt: skip
+    one, other = (rows[name] for name in exchanged)
+    key = "natural_angular_frequency"
+    one[key], other[key] = other[key], one[key]
+    for row in rows.values():
+        mass, omega = float(str(row["own_mass_kg"])), float(str(row[key]))
+        row["spring_constant"] = omega**2 * (mass + SPRING_KG / 3.0)
+        row |= {"own_mass_kg_u": 5e-5, f"{key}_u": 2e-5 * omega, "spring_mass_kg_u": 1e-4, "spring_constant_u": 0.01}
+    return list(rows.values())
+
+
+def suspects_of(cli, folder: Path, rows: list[dict[str, object]]) -> dict[str, str]:
+    """Compare rows as the results of a course; return what is said about each suspect, which no mean includes."""
+    folder.mkdir()
+    write_rows(folder, rows, ["group"])
+    compared = json.loads(cli("compare", folder, "--json").out)
+    assert compared["disagreements"] == []
+    assert compared["agreements"][0]["runs"] == len(rows) - len(compared["suspects"])
+    return {one["name"]: one["message"] for one in compared["suspects"]}
+
+
+@pytest.mark.parametrize("spread", [0.0, 0.003, 0.006, 0.01, 0.02])
+def test_exchanged_files_are_named_by_the_other_runs_of_their_benches(spread, tmp_path, cli):
+    """However much the springs of a box differ, both files of an exchange are named, and no other run."""
+    names = ("G5_disc", "G6_disc")
+    said = suspects_of(cli, tmp_path / "two", bench_rows(spread, names, runs_of_bench=2))
+    assert said.keys() == {*names}
+    assert all("G5_disc and G6_disc exchanged" in message for message in said.values())
+    # With one run a bench, springs that differ hide or question the exchange, but nothing else is said to be one.
+    said = suspects_of(cli, tmp_path / "one", bench_rows(spread, names, runs_of_bench=1))
+    assert said.keys() <= {*names}
+    if spread == 0.0:
+        assert all("G5_disc and G6_disc exchanged" in message for message in said.values())

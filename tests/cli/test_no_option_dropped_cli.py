@@ -152,13 +152,15 @@ SHOWN: dict[str, Shown] = {
         },
     },
     "page": {
-        "": ("page short.txt",),
-        "--page-port": (FREE, "page short.txt", f"page: http://127.0.0.1:{FREE}/"),
-        "--no-browser": ("", "page short.txt"),
+        "": ("page --play short.txt",),
+        "--play": ("", "page short.txt two.csv", "one recording is shown, got 2"),
+        "--shortcut": ("", "page", "opens the window"),
+        "--page-port": (FREE, "page --play short.txt", f"page: http://127.0.0.1:{FREE}/"),
+        "--no-browser": ("", "page --play short.txt"),
         "--want-us": ("0.5",),
         "--lan": ("",),
         "--law": ("quadratic",),
-        "--read": ("channel=x", "page two.csv"),
+        "--read": ("channel=x", "page --play two.csv"),
     },
     "recover": {
         "": ("recover base.wire",),
@@ -317,6 +319,7 @@ def outcome(files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Ite
     """Return what gives the exit code of a call, and all that it prints and writes, as a text."""
     board = Board()
     monkeypatch.setenv("BROWSER", "true")
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))  # where an icon of the window is put
     port = ListPortInfo(board.port)
     monkeypatch.setattr(serial.tools.list_ports, "comports", lambda *_, **__: [port])
 

@@ -104,11 +104,12 @@ def test_a_course_is_asked_for_pairs_that_work(cli: Cli, table: Path, tmp_path: 
 
 
 def test_the_page_is_asked_for_a_line_that_works(cli: Cli, table: Path, viewer: Viewer) -> None:
-    """It shows the run; without what the line adds there is no page."""
-    done = cli("page", table, "--no-browser")
+    """It keeps the answers, with which the run is shown; without them there is no page."""
+    shown = ("page", "--play", table, "--no-browser")
+    done = cli(*shown)
     assert (done.code, viewer.seen) == (3, [])
     _, *suggested = shlex.split(done.complaint[done.complaint.index("? springmass ") + 2 :])
-    assert cli(*suggested).code == 0
+    assert (cli(*suggested).code, cli(*shown).code) == (0, 0)
     assert "estimates" in viewer.seen[0]
 
 

@@ -104,3 +104,15 @@ def test_a_table_that_cannot_be_read_names_the_line(
     table.write_text(f"run,name,value,u,unit\n{line}\n")
     done = cli("compare", *bench, "--reported", table)
     assert (done.code, "t.csv, line 2" in done.complaint, words in done.complaint) == (2, True, True)
+
+
+def test_a_velocity_is_accused_of_false_echoes_only_beyond_its_u(bench: list[str], tmp_path: Path, cli: Cli) -> None:
+    """A Reynolds number within the u that is printed with it agrees; without recorded velocities it is only perhaps."""
+    for u, agrees in ((300, True), (3, False)):
+        table = write_table(tmp_path / f"{u}.csv", [("disc", "Re", 1220, u, "")])
+        (result,) = cli("compare", *bench, "--reported", table, "--json").results
+        (row,) = result["reported"]
+        assert (row["verdict"] == "agrees") is agrees
+        assert ("perhaps" in row["verdict"]) is not agrees
+        accused = [f["code"] for f in result["findings"] if "echoes" in f["code"]]
+        assert accused == ([] if agrees else ["reported_false_echoes"])

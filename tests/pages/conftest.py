@@ -61,7 +61,7 @@ def started(out: Path, *arguments: str) -> Iterator[Program]:
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
-        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        env={**os.environ, "PYTHONUNBUFFERED": "1", "XDG_STATE_HOME": str(out.parent / "state")},
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL) and None,
     )
     stream = process.stderr
@@ -134,7 +134,7 @@ def context(browser: Browser) -> Iterator[BrowserContext]:
 @pytest.fixture(scope="package")
 def old_run(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Any]]:
     """The address of the page of an old run, and the cookies of the browser that opened it."""
-    with started(tmp_path_factory.mktemp("old"), "page", str(OLD_RUN)) as program:
+    with started(tmp_path_factory.mktemp("old"), "page", "--play", str(OLD_RUN)) as program:
         with watched(browser) as first:
             opened(first, program.address, MOVES)
             cookies = first.storage_state()

@@ -38,7 +38,7 @@ def lines_after(program: Any) -> list[str]:
 
 def test_what_means_nothing_is_refused_and_the_page_goes_on(start: Callable[..., Any]) -> None:
     """A message closes its socket with 1003, a request gets its status; a few short lines, and viewers go on seeing."""
-    program = start("page", str(OLD_RUN))
+    program = start("page", "--play", str(OLD_RUN))
     client = Client(program.address)
     with client.socket() as looking:
         for name, message in MESSAGES.items():

@@ -20,7 +20,7 @@ def test_the_report_of_a_text_is_made_as_the_page_reads_it(start: Callable[..., 
     path = tmp_path / "bob.csv"
     rows = "".join(f"{t:.2f},{left:.4f},{right:.4f}\n" for t, left, right in zip(T, LEFT, RIGHT, strict=True))
     path.write_text(f"time (s),left,right\n{rows}")
-    client = Client(start("page", str(path), "--read", "channel=right", "--read", "unit=cm").address)
+    client = Client(start("page", "--play", str(path), "--read", "channel=right", "--read", "unit=cm").address)
     with client.socket() as run:
         run.send('{"type": "report"}')
         while (bench := bench_of(run.recv(timeout=LIMIT_S))).get("report") != "ready":

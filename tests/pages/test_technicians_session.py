@@ -107,7 +107,7 @@ def test_a_session_from_the_first_minute_to_the_report(
         assert marks == [[mark["t_s"], mark["text"]] for mark in run.provenance["marks"]]
         assert {"threshold_m": 0.01, "keep_s": 1.5} in [event["facts"] for event in run.provenance["events"]]
 
-    again = start("page", str(program.out))
+    again = start("page", "--play", str(program.out))
     page = opened(context, again.address, WHOLE)
     assert page.evaluate(NUMBERS) == shown
     assert page.evaluate("state.marks") == marks

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from acquisition.block import UNITS
 from acquisition.recordings.identify import open_recording
 from pipeline.analyse import Analysis, analyse
-from pipeline.track import UNITS, Track
+from pipeline.track import Track
 from springmass.loading.track import to_track
 from tests.sampling import sampled
 
@@ -104,7 +105,7 @@ def test_two_modes_of_equal_strength_are_both_named(ratio: float, quantity: str)
     """Neither is the oscillation; both periods are given, to a thousandth."""
     t = np.arange(3000) / 50.0
     y = np.cos(5.0 * t) + np.cos(5.0 * ratio * t + 0.4) + 0.01 * np.random.default_rng(2).standard_normal(t.size)
-    found = analyse(Track.from_arrays(t, 0.05 * y, quantity=quantity, unit=UNITS[quantity]))
+    found = analyse(Track.from_arrays(t, 0.05 * y, unit=UNITS[quantity]))
     expected = sorted([2 * np.pi / 5.0, 2 * np.pi / (5.0 * ratio)])
     assert told_modes(found) == pytest.approx(expected, rel=1e-3)
 
@@ -113,5 +114,5 @@ def test_a_clocked_switch_is_not_two_modes() -> None:
     """Its fundamental and third harmonic keep step."""
     t = np.arange(3000) / 50.0
     y = np.where(t % 2.0 < 1.0, 1.0, 0.0) + 0.01 * np.random.default_rng(2).standard_normal(t.size)
-    found = analyse(Track.from_arrays(t, y, quantity="voltage", unit="V"))
+    found = analyse(Track.from_arrays(t, y, unit="V"))
     assert found.estimates.keys() == {"offset", "noise"}

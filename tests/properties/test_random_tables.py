@@ -2,6 +2,7 @@
 
 Number form, time form, separator, heading and block form are drawn with a seed. Numbers and times are written as the
 locales of CLDR (Babel) write them, and as Python, numpy, pandas, MATLAB, Fortran and spreadsheets do.
+Columns, names and units of other programs stand beside them, and what wraps rows: quotes, comments, a monitor's clock.
 """
 
 from __future__ import annotations
@@ -92,6 +93,9 @@ TIMES: dict[str, tuple[str, Callable[[float, str], str]]] = {
     ),
 }
 HEADINGS = ("brackets", "below", "slash", "preamble", "none")
+TIME_NAMES = ("t", "time", "Time", "Zeit", "tiempo", "Tempo", "temps", "times", "elapsed time", "Time Run 2", "czas")
+VALUE_NAMES = ("x", "y", "Position", "theta", "Weg s_A1", "posizione", "Channel 1", "x_rojo", "amplitude", "Pos A")
+UNITS = {"cm": 0.01, "m": 1.0, "mm": 1e-3, "rad": 1.0, "deg": np.pi / 180, "V": 1.0, "m/s^2": 1.0}
 BLOCKS = ("plain", "plain", "plain", "newest first", "two blocks", "two sensors", "heading again", "long lines")
 
 
@@ -120,8 +124,9 @@ def write(seed: int) -> Written:
     value = np.array([float(f"{x:.4e}") if "scientific" in number else x for x in value])
     value = np.round(value, 3) if "grouped" in number else value
     time_unit, stamp = TIMES[time]
+    more = random.Random(f"more {seed}")
     cells = [[stamp(each, locale).strip() for each in t.tolist()], [NUMBERS[number](x, locale).strip() for x in value]]
-    unit = "cm" if heading != "none" else ""
+    unit = more.choice(tuple(UNITS)) if heading != "none" else ""
     if heading == "none":
         time_unit = ""
     if mark == " " and any(" " in cell or "\xa0" in cell for column in cells for cell in column):
@@ -130,7 +135,7 @@ def write(seed: int) -> Written:
         block = "plain"
     run = channel = ""
     rows = [list(row) for row in zip(*cells, strict=True)]
-    names = ["Time", "Position"]
+    names = [more.choice(TIME_NAMES), more.choice(VALUE_NAMES)]
     if block == "newest first":
         rows = rows[::-1]
     elif block == "two blocks":
@@ -138,33 +143,19 @@ def write(seed: int) -> Written:
     elif block == "two sensors" and heading != "none":
         other = [[row[0], "right", NUMBERS[number](float(size * i % 7), locale)] for i, row in enumerate(rows)]
         rows = [each for row, beside in zip(rows, other, strict=True) for each in ([row[0], "left", row[1]], beside)]
-        names, channel = ["Time", "sensor", "Position"], "Position left"
+        names, channel = [names[0], "sensor", names[1]], f"{names[1]} left"
     units = [time_unit, "", unit] if channel else [time_unit, unit]
-    out = io.StringIO()
-    writer = csv.writer(out, delimiter=mark, lineterminator="\n")
-    if heading == "preamble":
-        out.write("Logger of the bench\nStarted: today\n\n")
-    form = {"slash": "{} / {}", "brackets": "{} ({})", "preamble": "{} [{}]"}.get(heading, "{}")
-    form = form.replace(" ", "") if mark == " " else form
-    head = [form.format(name, own) if own else name for name, own in zip(names, units, strict=True)]
-    if block == "long lines":
-        for name, column in zip(head, zip(*rows, strict=True), strict=True):
-            writer.writerow([*([name] if heading == "brackets" else []), *column])
-        if heading != "brackets":
-            unit = time_unit = ""
-    else:
-        again = len(rows) // 2 if block in ("heading again", "two blocks") else len(rows)
-        for part in (rows[:again], rows[again:]):
-            if part and heading != "none" and (part is not rows[again:] or block == "heading again"):
-                writer.writerow(head)
-                if heading == "below":
-                    writer.writerow([f"({each})" if each else "" for each in units])
-            writer.writerows(part)
+    if not channel and heading != "none" and block == "plain" and more.random() < 0.5:
+        beside(more, rows, names, units)
+        channel = names[1]
+    text = laid_out(more, rows, list(zip(names, units, strict=True)), mark, heading, block)
+    if block == "long lines" and heading != "brackets":
+        unit = time_unit = ""
     drawn = f"{number} | {time} | {locale} | {mark!r} | {heading} | {block}"
     return Written(
-        out.getvalue(),
+        dressed(more, text, headed=heading != "none"),
         t,
-        value * (0.01 if unit else 1.0),
+        value * UNITS.get(unit, 1.0),
         run,
         channel,
         drawn,
@@ -173,9 +164,57 @@ def write(seed: int) -> Written:
     )
 
 
+def laid_out(
+    draw: random.Random, rows: list[list[str]], names: list[tuple[str, str]], mark: str, heading: str, block: str
+) -> str:
+    """Write rows with their heading, of names with units."""
+    out = io.StringIO()
+    quoting = csv.QUOTE_ALL if draw.random() < 0.1 else csv.QUOTE_MINIMAL
+    writer = csv.writer(out, delimiter=mark, lineterminator="\n", quoting=quoting)
+    if heading == "preamble":
+        out.write("Logger of the bench\nStarted: today\n\n")
+    form = {"slash": "{} / {}", "brackets": "{} ({})", "preamble": "{} [{}]"}.get(heading, "{}")
+    form = form.replace(" ", "") if mark == " " else form
+    head = [form.format(name, own) if own else name for name, own in names]
+    head[0] = draw.choice(("", "", "", "# ", "#", "% ") if mark != " " else ("", "#")) + head[0]
+    if block == "long lines":
+        for name, column in zip(head, zip(*rows, strict=True), strict=True):
+            writer.writerow([*([name] if heading == "brackets" else []), *column])
+    else:
+        again = len(rows) // 2 if block in ("heading again", "two blocks") else len(rows)
+        for part in (rows[:again], rows[again:]):
+            if part and heading != "none" and (part is not rows[again:] or block == "heading again"):
+                writer.writerow(head)
+                if heading == "below":
+                    writer.writerow([f"({each})" if each else "" for _, each in names])
+            writer.writerows(part)
+    return out.getvalue()
+
+
+def beside(draw: random.Random, rows: list[list[str]], names: list[str], units: list[str]) -> None:
+    """Put a column beside time and position, which is no channel or another one."""
+    name = draw.choice(("n", "uncertainty", "state", "other"))
+    names.append(name)
+    units.append(units[1] if name in ("uncertainty", "other") else "")
+    for number, row in enumerate(rows):
+        cells = {"n": str(number), "uncertainty": "9", "state": draw.choice(("ok", "low")), "other": str(number % 7)}
+        row.append(cells[name])
+
+
+def dressed(draw: random.Random, text: str, *, headed: bool) -> str:
+    """Write a table with a byte order mark, other line ends, or the clock of a serial monitor before each line.
+
+    Without a heading, the clock of the monitor would be the time.
+    """
+    lines = text.splitlines()
+    if draw.random() < 0.1 and headed:
+        lines = [f"15:{i // 6000:02d}:{i // 100 % 60:02d}.{i % 100:02d}0 -> {line}" for i, line in enumerate(lines)]
+    return draw.choice(("", "\ufeff")) + draw.choice(("\n", "\r\n")).join([*lines, ""])
+
+
 def judge(path: Path, table: Written) -> str:
     """Return ``read``, ``asked`` or what is wrong."""
-    path.write_text(table.text, encoding="utf-8")
+    path.write_text(table.text, encoding="utf-8", newline="")
     answers: dict[str, str] = {}
     for _ in range(3):
         try:

@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.block import Flag
+from acquisition.block import UNITS, Flag
 from acquisition.recordings.identify import open_recording
 from acquisition.recordings.reading import ReadOptions
-from pipeline.analyse import Analysis, Oscillation, analyse
-from pipeline.track import UNITS, Track
+from pipeline.analyse import Analysis, analyse
+from pipeline.track import Track
 from tests.sampling import sampled
 from tests.synthetic import Truth, noisy, times
 
@@ -50,7 +50,7 @@ def records() -> dict[str, np.ndarray]:
 
 def track(y: np.ndarray, factor: float, quantity: str = "length") -> Track:
     """Return a record whose values are multiplied by a factor."""
-    return Track.from_arrays(T, y * factor, quantity=quantity, unit=UNITS[quantity])
+    return Track.from_arrays(T, y * factor, unit=UNITS[quantity])
 
 
 def same(found: Analysis, expected: Analysis, factor: float) -> None:
@@ -65,9 +65,8 @@ def same(found: Analysis, expected: Analysis, factor: float) -> None:
         # A search ends within a ten-thousandth of a standard uncertainty, wherever rounding takes it.
         assert one.value == pytest.approx(scale * other.value, rel=1e-9, abs=1e-4 * scale * other.u), name
         assert one.u == pytest.approx(scale * other.u, rel=1e-4), name
-    if isinstance(found.motion, Oscillation) and isinstance(expected.motion, Oscillation):
-        assert found.motion.damping.selected == expected.motion.damping.selected
-        assert found.motion.damping.admissible == expected.motion.damping.admissible
+    assert found.damping.selected == expected.damping.selected
+    assert found.damping.admissible == expected.damping.admissible
     codes = [
         {each.code for each in one.findings} - {"implausible_motion", "implausible_distance", "implausible_sag"}
         for one in (found, expected)

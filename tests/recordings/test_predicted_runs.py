@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.analyse import Analysis, Oscillation, analyse
+from pipeline.analyse import Analysis, analyse
 from pipeline.bench.disc import derive_drag
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
@@ -39,14 +39,12 @@ def test_the_amplitude_with_a_disc_is_predicted() -> None:
         }
     )
     damped = analysed("damped position.txt", scene)
-    motion = damped.motion
-    assert isinstance(motion, Oscillation)
     ready = prepare(scene, 120.0, analysis=damped)
     assert ready.drag is not None
     assert ready.from_run == ("start_displacement_m", "start_velocity_m_per_s")
     band = spread(ready.solved, 120.0, ready.measured)
     middle, quantiles = band.amplitude_at(np.array([60.0]))
-    measured = float(motion.damping.best.amplitude(np.array([60.0]))[0])
+    measured = float(damped.damping.best.amplitude(np.array([60.0]))[0])
     low, high = float(quantiles[0, 0]), float(quantiles[3, 0])
     assert low < measured < high
     assert 0.7 * middle[0] < low

@@ -13,7 +13,6 @@ from pipeline.analyse import Analysis, analyse
 from pipeline.bench.scene import Scene
 from pipeline.findings.finding import Finding
 from pipeline.track import Track
-from tests.motion import motion_of
 
 RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "recordings"
 BARE = "AyushPandhi__Pandhi_Ayush_PHY224/position data.txt"
@@ -61,7 +60,7 @@ def test_mixed_drag_on_every_disc_run_of_two_minutes() -> None:
     """Both runs need linear and quadratic drag together: each beyond five uncertainties, each alone far worse."""
     assert mode_of(analysed(DISC)).values["amplitude_m"] == pytest.approx(9.6e-4, rel=0.05)
     for result in (analysed(DISC), analysed_capstone()):
-        fits = motion_of(result).damping.fits
+        fits = result.damping.fits
         mixed = fits["linear+quadratic"]
         assert all(mixed.joint[name].value > 5.0 * mixed.joint[name].u for name in ("gamma", "beta"))
         assert all(fits[name].bic > mixed.bic + 100.0 for name in ("linear", "quadratic", "friction"))
@@ -106,7 +105,7 @@ def test_velocity_is_the_recorded_one(name: str) -> None:
     recorded = {round(float(row[0]), 3): float(row[1]) / 100.0 for row in rows}
     result = analysed(name)
     v = np.array([recorded.get(round(float(x), 3), np.nan) for x in result.track.t])
-    found = motion_of(result).waveform.velocity
+    found = result.oscillation.waveform.velocity
     # A backward difference belongs half a sample earlier; of the disc's run it holds the sideways swing too.
     middle = np.concatenate([[np.nan], 0.5 * (found[1:] + found[:-1])])
     five = np.convolve(np.where(result.flags == 0, v - middle, np.nan), np.ones(5) / 5.0, mode="same")
@@ -126,8 +125,7 @@ REPORT_DISC = REPORT_BARE | {
 def test_disc_drag_falls_with_amplitude() -> None:
     """The disc's drag coefficient is near 4 at 50 mm and near 8 at 15 mm, by the law and by slopes without one."""
     scene = Scene.from_mapping(REPORT_DISC | {"air": {"temperature_c": {"value": 21.0, "u": 2.0}}})
-    motion = motion_of(analyse(analysed(DISC).track, scene))
-    curve = motion.derived.drag_curve(motion.damping, motion.windows)
+    curve = analyse(analysed(DISC).track, scene).drag_curve()
     assert curve is not None
     assert float(np.interp(0.050, curve.x, curve.y)) == pytest.approx(4.3, abs=0.6)
     assert float(np.interp(0.015, curve.x, curve.y)) == pytest.approx(7.8, abs=1.5)

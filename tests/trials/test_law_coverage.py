@@ -11,13 +11,12 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.analyse import Analysis, Oscillation, analyse
+from pipeline.analyse import Analysis, analyse
 from pipeline.options import options_for
 from pipeline.track import Track
 from tests.synthetic import LAW_TRUTHS, Truth, times
@@ -114,15 +113,13 @@ def analysed(
 def one_record(drag: str, seconds: float, noise_m: float, seed: int) -> tuple[list[float], list[float], list[float]]:
     """Return errors, stated uncertainties and those of the fit to compare with, of one record."""
     analysis = analysed(drag, seconds, noise_m, seed)
-    motion: Any = analysis.motion
-    assert isinstance(motion, Oscillation)
     # Clock and scale are exact here: what the record's own scatter says is held against it.
-    stated = {name: (e.value, motion.derived.budgets[name].u_of("A")) for name, e in analysis.estimates.items()}
-    for name, e in motion.derived.coefficients.items():
+    stated = {name: (e.value, analysis.derived.budgets[name].u_of("A")) for name, e in analysis.estimates.items()}
+    for name, e in analysis.derived.coefficients.items():
         if not truth(drag).get(name, 1.0):
             continue  # of one drag only, the other is stated where chance shows it, and not quoted
-        stated[name] = e.value, motion.derived.budgets[name].u_of("A")
-    fit = motion.damping.fits.get("linear+quadratic" if drag in WITHIN else drag)
+        stated[name] = e.value, analysis.derived.budgets[name].u_of("A")
+    fit = analysis.damping.fits.get("linear+quadratic" if drag in WITHIN else drag)
     own = {}
     if fit is not None:
         own = {"amplitude": fit.joint["A0"].u, "damping_rate": fit.damping_rate().u}

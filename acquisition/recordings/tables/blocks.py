@@ -99,7 +99,9 @@ def _blocks(lines: Lines | None, edges: Sequence[int]) -> list[I8]:
     blocks = [np.arange(start, stop) for start, stop in pairwise(edges)]
     if lines is None:
         return blocks
-    return [rows[: int(np.flatnonzero(~lines.words[rows])[-1]) + 1] for rows in blocks]
+    # If every row begins with words, none is a remark between two blocks.
+    ends = [int(np.max(np.flatnonzero(~lines.words[rows]), initial=-1)) + 1 for rows in blocks]
+    return [rows[: end or rows.size] for rows, end in zip(blocks, ends, strict=True)]
 
 
 def with_units_of_rows(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import zip_longest
 
 import numpy as np
 
@@ -33,6 +34,7 @@ _DAY_STEPS = (1e-9, 2e-5)
 _LATE = 2e4
 """Steps without a unit of this size, so many of them after zero, are rather fractions of a day (0.1 ms to 2 s)."""
 _FIRST_ROWS = 50
+_ROWS_SHOWN, _COLUMNS_SHOWN = 6, 12
 _SOME = 20_000
 _FEWEST_ROWS, _FEWEST_TURNS, _MOST_NAMES = 20, 4, 4
 _SHARE_OF_RESTARTS = 0.2
@@ -80,8 +82,16 @@ def choose_channel(path: str, tables: Sequence[Table], answers: ReadOptions) -> 
         needs.append(_unit_needed(column))
     if needs:
         labels = tuple(each.label for _, each in channels)
-        raise NeedsAnswer(Question(path, tuple(needs), labels, _range_of(table.times)))
+        raise NeedsAnswer(Question(path, tuple(needs), labels, _range_of(table.times), rows=_first_rows(table)))
     return table, column
+
+
+def _first_rows(table: Table) -> tuple[tuple[str, ...], ...]:
+    """Return the names of the first columns and their first numbers, for a person who is to choose among them."""
+    times = () if table.times is None else (table.times,)
+    columns = [*times, *table.columns][:_COLUMNS_SHOWN]
+    cells = [["" if np.isnan(x) else f"{x:.9g}" for x in each.values[:_ROWS_SHOWN]] for each in columns]
+    return tuple(each.label for each in columns), *zip_longest(*cells, fillvalue="")
 
 
 def measure(path: str, column: Column, unit: str | None) -> tuple[Measure, tuple[FormatIssue, ...]]:

@@ -132,7 +132,7 @@ def _numeric_day(date: str) -> int:
 def _ordinal(year: int, month: int, day: int) -> int:
     try:
         return datetime.date(year, month, day).toordinal()
-    except ValueError:
+    except (ValueError, OverflowError):  # of a number of thirteen digits
         return 0
 
 

@@ -45,7 +45,7 @@ def guarded(app: ASGIApp, access: Access, hosts: Iterable[str] = ()) -> ASGIApp:
     )
 
     async def with_headers(scope: Scope, receive: Receive, send: Send) -> None:
-        policy = REPORT_POLICY if scope.get("path") == REPORT else PAGE_POLICY
+        policy = REPORT_POLICY if scope.get("path", "").endswith("/report") else PAGE_POLICY
 
         async def sending(message: Message) -> None:
             if message["type"] == "http.response.start":

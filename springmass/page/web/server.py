@@ -8,14 +8,14 @@ import io
 import json
 import logging
 import socket
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import uvicorn
 from starlette.applications import Starlette
 from starlette.responses import FileResponse, PlainTextResponse, Response
-from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
@@ -25,6 +25,7 @@ from springmass.errors import LOG, SENSOR, ProgramError
 from springmass.page.state import REQUESTS, PageState
 from springmass.page.view import View, json_of
 from springmass.page.web.security import ACT, REPORT, Access, guarded
+from springmass.report.html import page_style
 from springmass.session.failures import raised_at
 from storage.errors import one_line
 
@@ -208,18 +209,27 @@ def application(page: PageState, share: str = "", polled: Callable[[int], None] 
             return PlainTextResponse("springmass: the page is not open to viewers; --lan opens it\n", 404)
         return Response(code_svg(share), media_type="image/svg+xml")
 
-    async def looks(_: Any) -> Response:
-        return Response(looks_script(), media_type="text/javascript")
-
     routes = [
         Route("/", main),
         Route(REPORT, report),
         Route("/v2/code.svg", code),
         WebSocketRoute("/v2/run", server.attend),
-        Route("/static/looks.js", looks),
-        Mount("/static", StaticFiles(directory=PAGE_FILES, packages=[(charts.__name__, "static")])),
+        *static_files(),
     ]
     return Starlette(routes=routes, lifespan=server.reading)
+
+
+def static_files() -> list[BaseRoute]:
+    """Return the routes of the files that never change: those of the page and of all charts."""
+
+    async def looks(_: Any) -> Response:
+        return Response(looks_script(), media_type="text/javascript")
+
+    async def report_style(_: Any) -> Response:
+        return Response(page_style(), media_type="text/css")
+
+    files = StaticFiles(directory=PAGE_FILES, packages=[(charts.__name__, "static")])
+    return [Route("/static/looks.js", looks), Route("/static/report.css", report_style), Mount("/static", files)]
 
 
 def serve(
@@ -247,22 +257,27 @@ def serve(
             alone_s = alone_s - TURN_S if after and not viewers else ALONE_S
             server.should_exit = server.should_exit or page.closed or left_s <= 0.0 or alone_s <= 0.0
 
-        config = uvicorn.Config(
-            guarded(application(page, share, polled), access, [network] if network else []),
-            http="h11",
-            limit_concurrency=MOST_CONNECTIONS,
-            log_config=None,
-            log_level="warning",
-            access_log=False,
-            ws_max_size=LONGEST_MESSAGE,
-            ws_ping_interval=20,
-            ws_per_message_deflate=False,  # it does not shorten a few samples, and costs more time than everything else
-            timeout_graceful_shutdown=2,
-        )
-        server = uvicorn.Server(config)
-        logging.getLogger().addHandler(_Lines())
-        logging.captureWarnings(True)
+        server = server_of(application(page, share, polled), access, [network] if network else [])
         server.run(sockets=[listener])
+
+
+def server_of(app: Starlette, access: Access, hosts: Sequence[str] = (), ping_s: float | None = 20.0) -> uvicorn.Server:
+    """Return the server of an application with access control; ``ping_s`` is how often sockets must answer."""
+    config = uvicorn.Config(
+        guarded(app, access, hosts),
+        http="h11",
+        limit_concurrency=MOST_CONNECTIONS,
+        log_config=None,
+        log_level="warning",
+        access_log=False,
+        ws_max_size=LONGEST_MESSAGE,
+        ws_ping_interval=ping_s,
+        ws_per_message_deflate=False,  # it does not shorten a few samples, and costs more time than everything else
+        timeout_graceful_shutdown=2,
+    )
+    logging.getLogger().addHandler(_Lines())
+    logging.captureWarnings(True)
+    return uvicorn.Server(config)
 
 
 class _Lines(logging.Handler):

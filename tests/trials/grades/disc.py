@@ -8,7 +8,6 @@ from itertools import combinations
 import springmass
 from pipeline.numerics.estimate import Estimate
 from tests.golden.inputs import RECORDINGS
-from tests.motion import motion_of
 
 RUN = RECORDINGS / "AyushPandhi__Pandhi_Ayush_PHY224" / "damped position.txt"
 STARTS_S = (None, 20.0, 40.0)
@@ -20,10 +19,9 @@ RATE = f"λ at {AMPLITUDE_M * 1e3:g} mm"
 def values_from(start_s: float | None) -> tuple[dict[str, Estimate], frozenset[str]]:
     """Return coefficients of linear and quadratic drag, and their damping rate at one amplitude, and the warnings."""
     analysis = springmass.analyse(RUN, from_s=start_s).analysis
-    motion = motion_of(analysis)
-    fit = motion.damping.of_powers(1, 2)
+    fit = analysis.damping.of_powers(1, 2)
     assert fit is not None
-    found = motion.derived.parameters_of(fit)
+    found = analysis.derived.parameters_of(fit)
     values = {name: found[name] for name in COEFFICIENTS}
     values[RATE] = Estimate.of_variable(found["gamma"].ufloat + found["beta"].ufloat * AMPLITUDE_M, "1/s")
     return values, frozenset(f.code for f in analysis.findings if f.severity != "info")

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.analyse import Analysis, Oscillation
+from pipeline.analyse import Analysis
 from pipeline.track import UNUSABLE
 from springmass.result.grades import grades_of
 
@@ -54,13 +54,13 @@ class Said:
 
 def said_of(analysis: Analysis) -> Said:
     """Return what the program says of an analysed recording; a value without a grade passes for sound."""
-    motion, grades = analysis.motion, grades_of(analysis)
+    grades = grades_of(analysis)
     every = dict(analysis.estimates)
     start_s = float(analysis.track.t[np.argmax((analysis.flags & UNUSABLE) == 0)])
-    if isinstance(motion, Oscillation):
+    if (motion := analysis.oscillation) is not None:
         start_s = motion.phase.t0
-        if motion.derived.quoted:
-            every = {**motion.derived.coefficients, **every}
+        if analysis.derived.quoted:
+            every = {**analysis.derived.coefficients, **every}
     values = {
         name: Graded(float(x.value), float(x.u), name not in grades or grades[name].grade == "sound")
         for name, x in every.items()

@@ -15,10 +15,9 @@ import numpy as np
 
 from pipeline.analyse import analyse
 from pipeline.bench.scene import Scene
-from pipeline.track import UNITS, Track
+from pipeline.track import Track
 from tests.trials.grades.graded import F8, Said, Truth, said_of
 
-QUANTITIES = {unit: quantity for quantity, unit in UNITS.items()}
 GRAVITY_M_PER_S2 = 9.81
 
 
@@ -34,7 +33,7 @@ class Trouble:
 
     def said(self) -> Said:
         """Return what the program says of it."""
-        track = Track.from_arrays(self.t, self.y, unit=self.unit, quantity=QUANTITIES[self.unit])
+        track = Track.from_arrays(self.t, self.y, unit=self.unit)
         return said_of(analyse(track, Scene.from_mapping(self.scene)))
 
 

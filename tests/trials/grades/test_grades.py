@@ -15,11 +15,9 @@ RECORDS = min(clean.RECORDS, int(os.environ.get("SPRINGMASS_TRIALS", "48")))
 
 # Kinds and files with values that are called sound and are wrong today. One that is mended is to be taken out.
 WRONG_KINDS = {
-    "strong-pendulum", "moving-rest", "turning-plane", "ellipse", "close-modes", "slack-string", "magnitude",
-    "radial-acceleration", "magnet-pendulum", "driven", "mains-hum", "leaking-mass", "frame-rate", "pendulum-position",
-    "pendulum-gyro", "cantilever-overtone",
+    "strong-pendulum", "moving-rest", "turning-plane", "ellipse",
 }  # fmt: skip
-WRONG_FILES = WRONG_KINDS - {"cantilever-overtone", "close-modes", "turning-plane"} | {"strong-creep"}
+WRONG_FILES = WRONG_KINDS - {"turning-plane"} | {"strong-creep"}
 
 pytestmark = pytest.mark.trials
 
@@ -60,7 +58,6 @@ def test_values_of_real_recordings_stay_sound() -> None:
 
 
 @pytest.mark.skipif(not RECORDINGS.is_dir(), reason="needs ../shared/recordings")
-@pytest.mark.xfail(reason="gamma of a real disc run depends on where the run begins", strict=True)
 def test_the_drag_of_a_disc_does_not_depend_on_the_start() -> None:
     """Coefficients and the damping rate at 25 mm, of all and from 20 and 40 s, agree within two of the larger u."""
     apart = list(disc.apart())

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.analyse import Analysis, Oscillation, Relaxation, analyse
+from pipeline.analyse import Analysis, analyse
 from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError
 from pipeline.options import options_for
@@ -160,6 +160,6 @@ def _beginning(analysis: Analysis) -> float:
     It is the first sample, unless a finding says that a part is left out.
     """
     said = any(finding.code in LEAVES_OUT for finding in analysis.findings)
-    if said or isinstance(analysis.motion, Oscillation | Relaxation):
+    if said or analysis.ok:
         return analysis.motion.start_s
     return float(analysis.track.t[np.flatnonzero(np.isfinite(analysis.track.y))[0]])

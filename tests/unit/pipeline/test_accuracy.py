@@ -13,7 +13,6 @@ from pipeline.bench.scene import Scene
 from pipeline.options import TIERS, Options, options_for
 from pipeline.track import F8, Track
 from tests import synthetic
-from tests.motion import motion_of
 
 every_tier = pytest.mark.parametrize("accuracy", TIERS)
 
@@ -56,7 +55,7 @@ def test_a_stated_law_is_fitted_to_two_periods() -> None:
     t = np.arange(100) / 60
     y = 0.3 + 0.05 * np.exp(-0.4 * t) * np.cos(8.3 * t) + 5e-4 * np.random.default_rng(1).standard_normal(t.size)
     result = analyse(Track.from_arrays(t, y), options=Options(stated="linear"))
-    assert motion_of(result).damping.by_statement
+    assert result.damping.by_statement
     assert result.estimates["damping_rate"].value == pytest.approx(0.4, abs=0.05)
 
 

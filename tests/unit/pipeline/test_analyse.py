@@ -19,7 +19,6 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.options import options_for
 from pipeline.track import Track
 from tests import synthetic
-from tests.motion import motion_of
 from tests.sampling import sampled
 
 
@@ -45,14 +44,14 @@ def test_agrees_with_a_waveform_fit_by_lmfit(
     other = model.fit(y, x=t, c=truth.offset, a=truth.amplitude, g=truth.gamma, w=truth.omega, p=truth.phase)
     options = replace(options_for(accuracy), laws=("linear",))
     result = analyse(Track.from_arrays(t, y), options=options)
-    motion, params = motion_of(result), other.params
+    params = other.params
     omega, u_omega = params["w"].value, params["w"].stderr
     pairs = {
         name: (result.estimates[name], params[x]) for name, x in (("amplitude", "a"), ("phase", "p"), ("offset", "c"))
     }
-    pairs["gamma"] = motion.damping.fits["linear"].joint["gamma"], params["g"]
+    pairs["gamma"] = result.damping.fits["linear"].joint["gamma"], params["g"]
     held = {name: (found, x.value, x.stderr) for name, (found, x) in pairs.items()}
-    held["period"] = motion.derived.statistical["period"], 2 * math.pi / omega, 2 * math.pi / omega**2 * u_omega
+    held["period"] = result.derived.statistical["period"], 2 * math.pi / omega, 2 * math.pi / omega**2 * u_omega
     for name, (found, value, u) in held.items():
         assert abs(found.value - value) <= near * u, name
         assert found.u == pytest.approx(u, rel=alike), name
@@ -141,11 +140,11 @@ def test_amplitude_and_phase_are_of_the_first_row_though_an_echo_stands_there(lo
     """False echoes at the beginning move neither the moment that numbers are stated for nor what they say of it."""
     truth, t = synthetic.Truth(gamma=0.05), synthetic.times(20.0)
     y = synthetic.noisy(truth, t, 3e-4, 3)
-    clean = motion_of(analyse(Track.from_arrays(t + 7.0, y)))
+    clean = analyse(Track.from_arrays(t + 7.0, y))
     y[:lost] = 1.3
-    found = motion_of(analyse(Track.from_arrays(t + 7.0, y)))
+    found = analyse(Track.from_arrays(t + 7.0, y))
     for name in ("amplitude", "phase"):
-        one, other = found.derived.estimates[name], clean.derived.estimates[name]
+        one, other = found.estimates[name], clean.estimates[name]
         assert abs(one.value - other.value) < 0.5 * max(one.u, other.u), name
 
 
@@ -181,5 +180,5 @@ def test_a_computed_sine_has_no_warning(accuracy: str) -> None:
             Track.from_arrays(t, 0.219 + 0.052 * np.cos(2.0 * np.pi * t / period)), None, options_for(accuracy)
         )
         assert [one.code for one in found.findings if one.severity != "info"] == []
-        assert motion_of(found).damping.selected == "none"
+        assert found.damping.selected == "none"
         assert abs(pull(found.estimates["amplitude"], 0.052)) < 4.0

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.analyse import analyse
-from pipeline.analysis import Analysis, Oscillation
+from pipeline.analysis import Analysis
 from pipeline.bench.scene import Scene
 from pipeline.track import Track
 from tests.sampling import sampled
@@ -24,8 +24,7 @@ def codes(analysis: Analysis, *severities: str) -> set[str]:
 
 def pulled(analysis: Analysis, period_s: float) -> float:
     """Return the error of the angular frequency in standard uncertainties of the recording, without the clock's."""
-    assert isinstance(analysis.motion, Oscillation)
-    omega = analysis.motion.phase.angular_frequency
+    omega = analysis.oscillation.phase.angular_frequency
     return (omega.value - 2.0 * math.pi / period_s) / omega.u
 
 
@@ -104,7 +103,7 @@ def test_a_wide_pendulum(quadratic: float, degrees: int) -> None:
     angle += math.radians(0.1) * np.random.default_rng(degrees).standard_normal(t.size)
     step = math.radians(0.25)
     scene = Scene(pendulum_length_m=(9.81 / square, 1e-6))
-    analysis = analyse(Track.from_arrays(t, step * np.round(angle / step), unit="rad", quantity="angle"), scene)
+    analysis = analyse(Track.from_arrays(t, step * np.round(angle / step), unit="rad"), scene)
     assert not codes(analysis) & {"touched", "phase_jump", "restarted", "handled"}
     assert degrees > 75 or "rest_drift" not in codes(analysis)
     amplitude, small = analysis.estimates["amplitude"], analysis.estimates["period_small_swings"]
@@ -124,7 +123,7 @@ def test_the_amplitude_of_a_small_pendulum_is_corrected_for(degrees: int) -> Non
     t, start = np.arange(1000) / 50, math.radians(degrees)
     period = 4.0 * math.sqrt(1.0 / 9.81) * float(ellipk(math.sin(0.5 * start) ** 2))
     angle = start * np.cos(2.0 * math.pi * t / period) + 1e-4 * np.random.default_rng(degrees).standard_normal(t.size)
-    analysis = analyse(Track.from_arrays(t, angle, unit="rad", quantity="angle"), Scene(pendulum_length_m=(1.0, 1e-6)))
+    analysis = analyse(Track.from_arrays(t, angle, unit="rad"), Scene(pendulum_length_m=(1.0, 1e-6)))
     gravity = analysis.estimates["gravity"]
     assert abs(gravity.value - 9.81) < 3.0 * gravity.u
     assert gravity.u < 2e-3

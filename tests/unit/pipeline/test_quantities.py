@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from acquisition.block import UNITS
 from pipeline.analyse import analyse
 from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError, TrackError
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import classic
 from pipeline.several.compare import SpringRun
-from pipeline.track import UNITS, Track
-from tests.motion import motion_of
+from pipeline.track import Track
 from tests.sampling import sampled
 from tests.synthetic import Truth, noisy, times
 
@@ -28,28 +28,27 @@ SCENE = Scene.from_mapping(
         "air": {"temperature_c": 20.0},
     }
 )
-OTHERS = {quantity: unit for quantity, unit in UNITS.items() if quantity != "length"}
-every = pytest.mark.parametrize(("quantity", "unit"), sampled(OTHERS.items(), 3))
+every = pytest.mark.parametrize("unit", sampled(list(UNITS.values())[1:], 3))
 
 
-def track(quantity: str = "length", unit: str = "m", *, seconds: float = 60.0, seed: int = 1) -> Track:
+def track(unit: str = "m", *, seconds: float = 60.0, seed: int = 1) -> Track:
     """Return the same numbers as a record of one quantity."""
     t = times(seconds)
-    return Track.from_arrays(t, noisy(TRUTH, t, SIGMA, seed), quantity=quantity, unit=unit)
+    return Track.from_arrays(t, noisy(TRUTH, t, SIGMA, seed), unit=unit)
 
 
 @every
-def test_the_same_numbers_give_the_same_results_in_their_own_unit(quantity: str, unit: str) -> None:
+def test_the_same_numbers_give_the_same_results_in_their_own_unit(unit: str) -> None:
     """Whatever a record is of, period, damping and amplitudes are those of a length, and only the units differ."""
-    length, other = analyse(track()), analyse(track(quantity, unit))
+    length, other = analyse(track()), analyse(track(unit))
     for name in ("period", "frequency", "damping_rate", "quality_factor", "phase"):
         assert other.estimates[name] == length.estimates[name], name
     for name in ("amplitude", "offset", "noise"):
         mine, its = other.estimates[name], length.estimates[name]
         assert (mine.value, mine.u) == (its.value, its.u)
         assert (mine.unit, its.unit) == (unit, "m")
-    assert motion_of(other).damping.selected == motion_of(length).damping.selected == "linear+quadratic"
-    units = dict(zip(*(getattr(motion_of(other).damping.best.joint, each) for each in ("names", "units")), strict=True))
+    assert other.damping.selected == length.damping.selected == "linear+quadratic"
+    units = dict(zip(*(getattr(other.damping.best.joint, each) for each in ("names", "units")), strict=True))
     per = {
         "rad": "1/(rad s)",
         "V": "1/(V s)",
@@ -60,18 +59,17 @@ def test_the_same_numbers_give_the_same_results_in_their_own_unit(quantity: str,
         "1": "1/s",
     }
     assert units == {"A0": unit, "gamma": "1/s", "beta": per[unit]}
-    assert motion_of(other).derived.coefficients["beta"].unit == per[unit]
+    assert other.derived.coefficients["beta"].unit == per[unit]
 
 
 @every
-def test_no_number_is_in_metres_where_nothing_was_measured_in_them(quantity: str, unit: str) -> None:
+def test_no_number_is_in_metres_where_nothing_was_measured_in_them(unit: str) -> None:
     """Units of estimates, budgets, laws and effects, with a bench that knows everything."""
-    found = analyse(track(quantity, unit), SCENE)
-    motion = motion_of(found)
+    found = analyse(track(unit), SCENE)
     units = {name: each.unit for name, each in found.estimates.items()}
-    units |= {f"budget {name}": each.estimate.unit for name, each in motion.derived.budgets.items()}
+    units |= {f"budget {name}": each.estimate.unit for name, each in found.derived.budgets.items()}
     units |= {f"effect {each.name}": each.unit for each in found.effects}
-    for name, fit in motion.damping.fits.items():
+    for name, fit in found.damping.fits.items():
         units |= {f"{name} {x}": own for x, own in zip(fit.joint.names, fit.joint.units, strict=True)}
     needless = {name for name, own in units.items() if re.search(r"\bm\b", own.replace(unit, ""))}
     # A mass and a period give N/m whatever was recorded; an acceleration gives lengths by omega^2.
@@ -93,11 +91,11 @@ def test_a_derivative_gives_the_displacement_and_what_follows_from_it(order: int
     noise = np.random.default_rng(4).standard_normal(t.size)
     if order == 2:
         y = 9.81 + TRUTH.omega**2 * displacement + 0.02 * noise
-        by_derivative = analyse(Track.from_arrays(t, y, quantity="acceleration", unit="m/s^2"), SCENE)
+        by_derivative = analyse(Track.from_arrays(t, y, unit="m/s^2"), SCENE)
     else:
         # A central difference is smaller than the velocity by sin(omega h)/(omega h).
         y = np.gradient(displacement, t, edge_order=2) / np.sinc(TRUTH.omega * (t[1] - t[0]) / np.pi) + 0.0025 * noise
-        by_derivative = analyse(Track.from_arrays(t, y, quantity="velocity", unit="m/s"), SCENE)
+        by_derivative = analyse(Track.from_arrays(t, y, unit="m/s"), SCENE)
     by_length = analyse(track(), SCENE)
     amplitude = by_derivative.estimates["displacement_amplitude"]
     assert amplitude.unit == "m"
@@ -121,7 +119,7 @@ def test_what_a_scene_allows_of_an_angle_a_voltage_and_a_force() -> None:
         ("voltage", SCENE, True),
         ("force", SCENE, True),
     ):
-        found = analyse(track(quantity, UNITS[quantity]), scene)
+        found = analyse(track(UNITS[quantity]), scene)
         assert ("spring_constant" in found.estimates) == known
         if known:
             assert (
@@ -135,8 +133,8 @@ def test_what_a_scene_allows_of_an_angle_a_voltage_and_a_force() -> None:
 def test_what_needs_a_length_says_so_in_one_line() -> None:
     """The report's own method, and springs compared by a pendulum's angle."""
     with pytest.raises(TrackError, match="length in m, got voltage in V"):
-        classic(track("voltage", "V"))
-    found = analyse(track("angle", "rad"), SCENE)
+        classic(track("V"))
+    found = analyse(track("rad"), SCENE)
     with pytest.raises(AnalysisError, match=r"^swing: "):
-        SpringRun.of("swing", motion_of(found).derived)
-    assert SpringRun.of("coil", motion_of(analyse(track("voltage", "V"), SCENE)).derived).clock == ""
+        SpringRun.of("swing", found.derived)
+    assert SpringRun.of("coil", analyse(track("V"), SCENE).derived).clock == ""

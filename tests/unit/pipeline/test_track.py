@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.block import UNITS as BLOCK_UNITS
-from acquisition.block import Flag
+from acquisition.block import UNITS, Flag
 from pipeline.errors import PipelineError, TrackError
-from pipeline.track import UNITS, Quality, Track
+from pipeline.track import Quality, Track
+from pipeline.units import RECORDED_UNITS
 
 
 def test_quality_is_the_run_files_flags() -> None:
@@ -60,4 +60,4 @@ def test_any_numbers_make_a_track_or_a_track_error(t: list[float], y: list[float
 
 def test_units_are_those_of_blocks() -> None:
     """The pipeline's quantities and the acquisition's are one table."""
-    assert UNITS == BLOCK_UNITS
+    assert {recorded.quantity: unit for unit, recorded in RECORDED_UNITS.items()} == UNITS

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.analyse import Analysis, Oscillation, analyse
+from pipeline.analyse import Analysis, analyse
 from pipeline.bench.scene import Scene
 from pipeline.track import Quality, Track
 from sample_data import generate
@@ -33,12 +33,6 @@ class Sample:
     def value(self, name: str) -> float:
         """Return one true quantity."""
         return float(self.truth["truth"][name]["value"])
-
-    @property
-    def motion(self) -> Oscillation:
-        """What was found to move."""
-        assert isinstance(self.result.motion, Oscillation)
-        return self.result.motion
 
     def share_flagged(self, rows: str, flag: Quality) -> float:
         """Share of the listed rows that ended with a flag."""
@@ -91,8 +85,8 @@ def test_every_truth_is_within_three_uncertainties(run: Sample) -> None:
 
 def test_true_law_is_admissible(run: Sample) -> None:
     """The law that made the recording is not rejected."""
-    assert run.truth["law"] in run.motion.damping.admissible
-    assert "none" not in run.motion.damping.admissible
+    assert run.truth["law"] in run.result.damping.admissible
+    assert "none" not in run.result.damping.admissible
 
 
 def test_false_echoes_are_flagged(run: Sample) -> None:

@@ -9,7 +9,6 @@ from pipeline.analyse import Analysis, analyse
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import UpperLimit
 from pipeline.track import F8, Track
-from tests.motion import motion_of
 
 T = np.arange(6000) / 100.0
 
@@ -33,7 +32,7 @@ def test_the_law_of_the_scene_is_the_stated_one() -> None:
     """Its coefficients stay out: the rate is that of the recording, by the law alone, and every law is fitted."""
     scene = Scene.from_mapping({"damping": {"law": "linear", "gamma_per_s": 0.9}})
     analysis = analyse(LINEAR, scene)
-    damping, derived = motion_of(analysis).damping, motion_of(analysis).derived
+    damping, derived = analysis.damping, analysis.derived
     assert (damping.selected, damping.admissible, damping.stated) == ("linear", ("linear",), "linear")
     assert derived.law == "linear"
     assert len(damping.fits) > 5
@@ -45,7 +44,7 @@ def test_the_law_of_the_scene_is_the_stated_one() -> None:
 def test_a_recording_may_contradict_the_stated_law() -> None:
     """A warning names the law that fits; the numbers stay those of the stated one."""
     analysis = analyse(QUADRATIC, Scene(damping_law="friction"))
-    assert motion_of(analysis).damping.selected == "friction"
+    assert analysis.damping.selected == "friction"
     assert "stated_law_rejected" in codes_of(analysis)
     (finding,) = (finding for finding in analysis.findings if finding.code == "stated_law_rejected")
     assert finding.values["bic_excess"] > 10.0
@@ -54,7 +53,7 @@ def test_a_recording_may_contradict_the_stated_law() -> None:
 def test_where_no_law_fits_the_stated_one_is_not_charged_alone() -> None:
     """An amplitude that no law makes gives no_law_fits, with the nearest law, whichever was stated."""
     analysis = analyse(recorded(0.05 * (1.0 - 0.004 * T + 0.1 * np.sin(0.2 * T))), Scene(damping_law="quadratic"))
-    assert motion_of(analysis).damping.best.rejected
+    assert analysis.damping.best.rejected
     assert "no_law_fits" in codes_of(analysis)
     assert "stated_law_rejected" not in codes_of(analysis)
 
@@ -64,7 +63,7 @@ def test_coefficients_that_are_not_determined_are_upper_limits() -> None:
     t = T[:800]
     y = 0.2 + 0.05 * np.exp(-0.003 * t) * np.cos(8.3 * t)
     analysis = analyse(Track.from_arrays(t, y + 2e-3 * np.random.default_rng(5).standard_normal(t.size)))
-    coefficients = motion_of(analysis).derived.coefficients
+    coefficients = analysis.derived.coefficients
     assert set(coefficients) == {"gamma", "beta"}
     for x in coefficients.values():
         assert isinstance(x, UpperLimit)

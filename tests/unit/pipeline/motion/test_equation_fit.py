@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pipeline.analyse import Analysis, Oscillation, analyse
+from pipeline.analyse import Analysis, analyse
 from pipeline.bench.scene import Scene
 from pipeline.track import Track
 from tests.sampling import sampled
@@ -54,12 +54,11 @@ def test_strong_damping_gives_law_spring_constant_and_coefficients(
 ) -> None:
     """The true law is admitted, and k, rest position and coefficients lie within 4 of their u."""
     result = analysed(coefficients, seed)
-    assert isinstance(result.motion, Oscillation)
-    damping = result.motion.damping
+    damping = result.damping
     assert "strongly_damped" in {finding.code for finding in result.findings}
     assert law in damping.admissible
     # Scale and spring have uncertainties that the noise does not contain.
-    e, joint = result.motion.derived.statistical, damping.fits[law].joint
+    e, joint = result.derived.statistical, damping.fits[law].joint
     true = {"spring_constant": OMEGA**2 * MASS, "offset": 0.3}
     pulls = {name: (joint[name].value - x) / joint[name].u for name, x in coefficients.items()}
     if damping.selected == law:
@@ -84,9 +83,8 @@ def test_intervals_hold_under_strong_damping(law: str, coefficients: dict[str, f
     for seed in range(TRIALS):
         y = 0.3 + moved(**coefficients) + 3e-4 * np.random.default_rng((seed, 5)).standard_normal(T.size)
         result = analyse(replace(Track.from_arrays(T, y), clock="device"), SPRING)
-        assert isinstance(result.motion, Oscillation)
         # Without the scale's and the sound's uncertainties, which do not scatter from run to run.
-        found = result.motion.derived.statistical | result.motion.damping.fits[law].joint.estimates()
+        found = result.derived.statistical | result.damping.fits[law].joint.estimates()
         pulls.append([abs(found[name].value - x) / found[name].u for name, x in true.items()])
     for level, width in ((0.6827, 1.0), (0.95, 1.959964)):
         shares = dict(zip(true, np.mean(np.array(pulls) <= width, axis=0).round(3).tolist(), strict=True))
@@ -103,8 +101,7 @@ def test_false_echoes_leave_the_fit() -> None:
     echoes = rng.random(T.size) < 0.05
     y[echoes] = rng.uniform(0.1, 1.5, np.count_nonzero(echoes))
     result = analyse(Track.from_arrays(T, y), SPRING)
-    assert isinstance(result.motion, Oscillation)
-    k = result.motion.derived.statistical["spring_constant"]
+    k = result.derived.statistical["spring_constant"]
     assert abs(k.value - OMEGA**2 * MASS) < 3.0 * k.u
     assert k.u < 3e-4 * k.value
     assert result.quality["false_echo"] >= 0.9 * np.count_nonzero(echoes)

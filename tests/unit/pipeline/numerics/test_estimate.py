@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from pipeline.numerics.estimate import Estimate, format_value
+from pipeline.numerics.estimate import Estimate
 
 PLAIN = re.compile(r"^(-?[\d.]+) \+- ([\d.]+)( \S+)?$")
 SCALED = re.compile(r"^\((-?[\d.]+) \+- ([\d.]+)\)e([+-]\d+)( \S+)?$")
@@ -37,7 +37,7 @@ def test_printed_value_is_the_value_within_a_tenth_of_u(value: float, mantissa: 
     """Read back, the value errs by less than u / 10 and u by less than a twentieth of itself."""
     u = mantissa * 10.0**power * (abs(value) if value else 1.0)
     assume(1e-280 < u < 1e280)
-    back, u_back, digits, u_digits = parse(format_value(value, u, unit))
+    back, u_back, digits, u_digits = parse(str(Estimate(value, u, unit)))
     assert abs(back - value) <= 0.1 * u
     assert abs(u_back - u) <= 0.0501 * u
     assert len(digits.partition(".")[2]) == len(u_digits.partition(".")[2])

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.analyse import Oscillation, analyse
+from pipeline.analyse import analyse
 from pipeline.bench.air import U_DENSITY, U_SOUND, U_VISCOSITY, air_density, air_viscosity, speed_of_sound
 from pipeline.bench.instrument import U_CRYSTAL
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.budget import Budget, Inputs, joint_of
+from pipeline.results.derive import Derived
 from pipeline.track import Track
 from tests.synthetic import Truth, noisy, times
 
@@ -35,18 +36,16 @@ SCENE: dict[str, Any] = {
 }
 
 
-def motion(tables: dict[str, Any] = SCENE, seconds: float = 117.0, **track: Any) -> Oscillation:
-    """Return the motion of a run of mixed drag in a scene."""
+def motion(tables: dict[str, Any] = SCENE, seconds: float = 117.0, **track: Any) -> Derived:
+    """Return the results of a run of mixed drag in a scene."""
     t = times(seconds)
     recorded = replace(Track.from_arrays(t, noisy(TRUTH, t, 1e-4, 3)), **track)
-    found = analyse(recorded, Scene.from_mapping(tables)).motion
-    assert isinstance(found, Oscillation)
-    return found
+    return analyse(recorded, Scene.from_mapping(tables)).derived
 
 
 @cache
-def whole() -> Oscillation:
-    """Return the motion of two minutes on a bench of which everything is known."""
+def whole() -> Derived:
+    """Return the results of two minutes on a bench of which everything is known."""
     return motion()
 
 
@@ -57,7 +56,7 @@ def part(budget: Budget, name: str) -> float:
 
 def test_shares_add_up_and_parts_give_the_total() -> None:
     """In every budget shares sum to one, contributions in quadrature to u, and the largest comes first."""
-    result = whole().derived
+    result = whole()
     assert set(result.budgets) == set(result.estimates) | set(result.coefficients)
     for budget in result.budgets.values():
         shares = [c.share for c in budget.contributions]
@@ -69,7 +68,7 @@ def test_shares_add_up_and_parts_give_the_total() -> None:
 
 def test_spring_constant_by_hand() -> None:
     """u(k): 2k u(T)/T, 2k u_c, omega^2 times u(m), (1/3 + 2 m_s/45 m) u(m_s), 8 rho a^2 u(a); the scale has none."""
-    result = whole().derived
+    result = whole()
     budget, omega = result.budgets["spring_constant"], result.estimates["angular_frequency"].value
     k = budget.estimate.value
     scatter = result.statistical["angular_frequency"].u
@@ -85,7 +84,7 @@ def test_spring_constant_by_hand() -> None:
 
 def test_distances_carry_the_scale_and_times_the_clock() -> None:
     """u(T)/2T = 0.26 % of amplitude and offset at 20 +- 1.5 degC; beta carries both, and in Q the clock cancels."""
-    result = whole().derived
+    result = whole()
     relative = 1.5 / (2 * 293.15)
     for name, source in (("amplitude", result.estimates), ("offset", result.estimates), ("beta", result.coefficients)):
         budget = result.budgets[name]
@@ -101,16 +100,16 @@ def test_distances_carry_the_scale_and_times_the_clock() -> None:
 
 def test_the_scale_is_that_of_the_air_of_the_recording_or_of_a_calibration() -> None:
     """Distances made with 340 m/s in air of 343.9 err by the difference; a calibration replaces the air's part."""
-    old = motion(speed_of_sound_m_per_s=340.0, seconds=20.0).derived.budgets["amplitude"]
+    old = motion(speed_of_sound_m_per_s=340.0, seconds=20.0).budgets["amplitude"]
     relative = part(old, "recorded_speed_of_sound") / old.estimate.value
     assert relative == pytest.approx((343.93 / 340 - 1) / math.sqrt(3), rel=0.01)
-    calibrated = motion(u_scale=2e-3, u_offset_m=5e-4, seconds=20.0).derived.budgets
+    calibrated = motion(u_scale=2e-3, u_offset_m=5e-4, seconds=20.0).budgets
     assert part(calibrated["amplitude"], "calibrated_scale") == pytest.approx(
         2e-3 * calibrated["amplitude"].estimate.value
     )
     assert part(calibrated["amplitude"], "air_temperature") == 0.0
     assert part(calibrated["offset"], "sensor_zero") == pytest.approx(5e-4)
-    assert part(motion({}, 20.0).derived.budgets["amplitude"], "air_temperature") == 0.0
+    assert part(motion({}, 20.0).budgets["amplitude"], "air_temperature") == 0.0
 
 
 def humid_air(celsius: np.ndarray, pascal: np.ndarray, humidity: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -121,7 +120,7 @@ def humid_air(celsius: np.ndarray, pascal: np.ndarray, humidity: np.ndarray) -> 
 
 def test_propagation_against_monte_carlo() -> None:
     """50,000 draws of all inputs through the model give the same u of every result, to 1.5 %, and the same value."""
-    result, n = whole().derived, 50_000
+    result, n = whole(), 50_000
     (stated,) = result.laws  # one admissible law: nothing but a normal distribution is drawn
     joint, rng = stated.fit.joint, np.random.default_rng(20240401)
     assert joint.names == ("A0", "gamma", "beta")
@@ -163,7 +162,7 @@ def test_propagation_against_monte_carlo() -> None:
 
 def test_estimates_carry_their_correlations() -> None:
     """Period times frequency is exactly 1, and a product of estimates has the variance that their covariance gives."""
-    found = whole().derived
+    found = whole()
     period, frequency = found.estimates["period"], found.estimates["frequency"]
     assert (period * frequency).std_dev < 1e-12
     a, b = found.estimates["amplitude"], found.coefficients["beta"]

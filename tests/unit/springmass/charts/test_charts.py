@@ -49,8 +49,7 @@ def damped() -> Analysis:
 @pytest.fixture(scope="module")
 def motion(damped: Analysis) -> Oscillation:
     """Its motion."""
-    assert isinstance(damped.motion, Oscillation)
-    return damped.motion
+    return damped.oscillation
 
 
 @pytest.fixture(scope="module")
@@ -144,13 +143,13 @@ def test_a_line_of_many_periods_is_solid() -> None:
     assert [line.get("winds", False) for line in panel["series"]] == [False, True]
 
 
-def test_several_runs(damped: Analysis, motion: Oscillation) -> None:
+def test_several_runs(damped: Analysis) -> None:
     """Positions from rest, spring constants and their pulls, and a quantity of a course by run."""
     over = overlay(["a", "b"], [damped, damped])
     assert over is not None
     _, y = Drawn(over).xy("a")
     assert np.max(np.abs(y)) == pytest.approx(1e3 * damped.estimates["amplitude"].value, rel=0.1)
-    runs = [SpringRun.of(name, motion.derived, clock=damped.track.clock) for name in ("a", "b")]
+    runs = [SpringRun.of(name, damped.derived, clock=damped.track.clock) for name in ("a", "b")]
     found = compare_springs(runs, spring_mass_kg=damped.scene.spring_mass_kg, mass_correlation=0.0)
     chart = Drawn(comparison(found))
     _, k = chart.xy("spring constant")

@@ -127,7 +127,7 @@ def test_the_frame_of_estimates(damped: sm.Run, still: sm.Run) -> None:
     assert frame.loc["gamma", "u"] == damped["gamma"].u
     assert frame.loc["period", "symbol"] == "T"
     np.testing.assert_allclose(frame.expanded, frame.coverage_factor * frame.u)
-    assert frame.loc["gamma", "dof"] == damped.analysis.motion.derived.budgets["gamma"].dof < 200.0
+    assert frame.loc["gamma", "dof"] == damped.analysis.derived.budgets["gamma"].dof < 200.0
     wide = damped.to_dataframe(correlations=True)
     matrix = wide[[f"r({name})" for name in wide.index]].to_numpy()
     np.testing.assert_array_equal(matrix, matrix.T)

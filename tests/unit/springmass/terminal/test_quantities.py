@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pipeline.numerics.estimate import Estimate
-from springmass.terminal.style import PLAIN, TerminalStyle, concise, shown
+from springmass.terminal.style import TerminalStyle, concise, shown
 from springmass.typeset import prefixed
 
 
@@ -26,7 +26,7 @@ def test_quantities_read_as_people_write_them(estimate: Estimate, short: str, lo
     """A prefix that leaves 1 to 1000 in front of it, both ways to state u; a pipe gets SI."""
     style = TerminalStyle(True, True, False, 80)
     assert (concise(estimate, style), shown(estimate, style)) == (short, long)
-    assert shown(estimate, PLAIN).isascii()
+    assert shown(estimate, TerminalStyle()).isascii()
     assert prefixed(estimate).value == pytest.approx(
         estimate.value * {"mm": 1e3, "µm": 1e6, "g": 1e3}.get(prefixed(estimate).unit, 1.0), nan_ok=True
     )

@@ -1,0 +1,82 @@
+"""Half: whether the line that was analysed has twice the frequency of the motion."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pipeline.checks.residual import PARTS, Outcome, Residual
+from pipeline.numerics.levels import IMPROBABLE, NEGLIGIBLE, SIGNIFICANT
+from pipeline.track import F8
+
+# Harmonics of the motion that make pulses, with the line at twice its frequency.
+PULSES = 3
+HIGHEST_MULTIPLE = 8  # order of the harmonics of the motion that are sought
+# How far the mean moves over the amplitude of the line at twice the frequency, and the harmonic of that line over
+# it. A radial acceleration is g (1 + A^2/4 - 3/4 A^2 cos 2 phi), the magnitude of a sine
+# 2/pi + 4/(3 pi) cos 2 phi - 4/(15 pi) cos 4 phi + ...
+RADIAL, MAGNITUDE, CUSPS = 1.0 / 3.0, 1.5, -0.2
+
+
+def half_frequency(residual: Residual) -> Outcome | None:
+    """Test for values that go through two cycles in each cycle of the motion.
+
+    A line at half of the main frequency, locked to its phase, is that of the motion if the mean moves as that of a
+    radial acceleration, or if further harmonics make the values pulses, as of a magnet that passes a sensor twice. A
+    sideways swing at half of the frequency does neither. The magnitude of a sine has no such line, but cusps.
+    """
+    if not residual.enough:
+        return None
+    level, moves, u_moves = _mean_by_amplitude(residual)
+    values = residual.values + residual.fitted.modes.independent(residual.samples.track.t[residual.rows])
+    found: dict[str, float | None] = {}
+    if _locked(residual, values, 1):
+        sizes = [abs(_locked(residual, values, order)) for order in range(3, HIGHEST_MULTIPLE + 1)]
+        pulses = 1 + np.count_nonzero(sizes)
+        if abs(abs(moves) - RADIAL) < NEGLIGIBLE * RADIAL + SIGNIFICANT * u_moves < RADIAL:
+            found["radial"] = moves
+        elif pulses >= PULSES and math.hypot(*sizes) > NEGLIGIBLE * residual.amplitude:
+            found["pulses"] = float(pulses)
+    elif any(abs(ratio - MAGNITUDE) < NEGLIGIBLE * MAGNITUDE for ratio in (level, moves)):
+        second = _locked(residual, values, 4) / residual.amplitude
+        if abs(second - CUSPS) < 0.5 * abs(CUSPS):
+            found["cusps"] = second.real
+    if not found:
+        return None
+    motion_s = 4.0 * math.pi / residual.fitted.phase.angular_frequency.value
+    return Outcome("half_frequency", {**found, "motion_s": motion_s})
+
+
+def _mean_by_amplitude(residual: Residual) -> tuple[float, float, float]:
+    """Return the mean over the amplitude, and by how much it moves with the amplitude, with its u."""
+    windows = residual.fitted.windows
+    size, offset = np.abs(windows.amplitude), windows.offset
+    away = size - size.mean()
+    squares = max(float(away @ away), 1e-300)
+    slope = float(away @ offset) / squares
+    left = offset - offset.mean() - slope * away
+    u = math.sqrt(float(left @ left) / max(size.size - 2, 1) / squares)
+    return float(offset.mean() / size.mean()), slope, u
+
+
+def _locked(residual: Residual, values: F8, order: int) -> complex:
+    """Return the mean amplitude of the harmonic of an order of half of the main frequency; 0 if it is not locked.
+
+    As in :func:`pipeline.checks.shape.folded_shape`, the parts of the run must agree on it: the squared mean over its
+    variance from their scatter has the F distribution. A line beside half of the frequency turns from part to part.
+    """
+    if 0.5 * order * residual.turn > 0.5 * math.pi:
+        return 0.0
+    wave = np.exp(-0.5j * order * residual.phase)
+    size = np.ones(values.size) if residual.relative is None else residual.relative ** (0.5 * order)
+    starts = np.arange(PARTS) * values.size // PARTS
+    own = np.add.reduceat(size**2, starts)
+    each = 2.0 * np.add.reduceat(values * size * wave, starts) / np.maximum(own, 1e-300)
+    mean = complex(own @ each / own.sum())
+    known = float(own.sum() ** 2 / (own @ own))
+    scatter = float(own**2 @ np.abs(each - mean) ** 2) / float(own.sum() ** 2) * known / max(known - 1.0, 1e-9)
+    variance = max(scatter, 4.0 * residual.noise**2 / float(own.sum()), 1e-300)
+    if known <= 2.0 or (1.0 + abs(mean) ** 2 / variance / (known - 1.0)) ** (1.0 - known) > IMPROBABLE:
+        return 0.0
+    return mean * float(np.mean(size))

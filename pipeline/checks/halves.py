@@ -1,0 +1,78 @@
+"""Whether both halves of a run have the same parameters, and what it means for their uncertainties if not."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.damping.law_fit import LawFit
+from pipeline.damping.select import Damping
+from pipeline.motion.fitted import Oscillation
+from pipeline.motion.kinds import Motion
+from pipeline.notice import Notice
+from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.halves import Difference, Points, difference
+from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_CURVE
+from pipeline.numerics.regression import Scatter
+from pipeline.track import F8
+
+
+def compare_halves(fitted: Motion) -> tuple[Motion, tuple[Notice, ...]]:
+    """Return a fit whose covariances include that its halves differ, and the finding; the fit as it is if they agree.
+
+    The halves are compared in one chi-square over the parameters of the damping law, of the phase, and of the rest
+    position unless it drifts, with the scatter of the windows about smooth curves that know no law. At a probability of
+    :data:`FALSE_ALARM` they differ, and each part's covariance is multiplied by its chi-square over its parameters.
+    """
+    from scipy.special import chdtrc
+
+    if not isinstance(fitted, Oscillation) or fitted.method == "equation":
+        return fitted, ()
+    windows, damping, phase, rest = fitted.windows, fitted.damping, fitted.phase, fitted.rest
+    of_law = _of_law(damping.best, damping, windows.t, windows.amplitude)
+    turned = _different(phase.spread, windows.phase - phase.total(windows.t), phase.columns(windows.t))
+    constant = None if rest.drifts else rest.spread
+    at_rest = _different(constant, windows.offset - rest.mean.value, np.ones((windows.t.size, 1)))
+    every = [one for one in (of_law, turned, at_rest) if one is not None]
+    chi2, count = sum(one.chi2 for one in every), sum(one.parameters for one in every)
+    if not every or not chdtrc(count, chi2) < FALSE_ALARM:
+        return fitted, ()
+    each = {name: _of_law(fit, damping, windows.t, windows.amplitude) for name, fit in damping.fits.items()}
+    fits = {name: _widened(fit, each[name]) for name, fit in damping.fits.items()}
+    small, backbone = (None if x is None else _wider(x, turned) for x in (phase.small_swings, phase.backbone))
+    if phase.area is None:
+        omega, start = (_wider(x, turned) for x in (phase.angular_frequency, phase.phase))
+        phase = replace(phase, angular_frequency=omega, phase=start)
+    fitted = replace(
+        fitted,
+        damping=replace(damping, fits=fits),
+        phase=replace(phase, small_swings=small, backbone=backbone),
+        rest=replace(rest, mean=_wider(rest.mean, at_rest)),
+    )
+    return fitted, (Notice("halves_differ", {"chi2": chi2, "parameters": count}),)
+
+
+def _different(spread: Scatter | None, residual: F8, slopes: F8) -> Difference | None:
+    if spread is None:
+        return None
+    kept, u = spread.kept, spread.u[spread.kept]
+    return difference(Points(residual[kept] / u, slopes[kept] / u[:, None], spread.correlation), FEWEST_FOR_CURVE)
+
+
+def _of_law(fit: LawFit, damping: Damping, t: F8, amplitude: F8) -> Difference | None:
+    with np.errstate(all="ignore"):
+        expected, slopes = fit.law.curve(t - damping.t0, fit.joint.values)
+    finite = bool(np.isfinite(expected).all() and np.isfinite(slopes).all())
+    return _different(damping.scatter, amplitude - expected, slopes) if finite else None
+
+
+def _widened(fit: LawFit, apart: Difference | None) -> LawFit:
+    """Return a fit whose covariance is larger by the factor of a difference, or as much as its misfit makes it."""
+    factor = 1.0 if apart is None else max(1.0, apart.factor / fit.widening)
+    return replace(fit, joint=replace(fit.joint, covariance=factor * fit.joint.covariance))
+
+
+def _wider(x: Estimate, apart: Difference | None) -> Estimate:
+    return x if apart is None else Estimate(x.value, x.u * math.sqrt(apart.factor), x.unit)

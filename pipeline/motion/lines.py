@@ -1,0 +1,272 @@
+"""Lines: a record as a sum of decaying oscillations, and a line among them that is not the free oscillation's."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from pipeline.motion.fit import Rows, fit
+from pipeline.numerics.levels import FEWEST_FOR_CURVE, IMPROBABLE, NEGLIGIBLE, NOTICEABLE, OUTLIER, ROUNDS
+from pipeline.numerics.regression import correlation_length
+from pipeline.numerics.robust import median
+from pipeline.samples.condition import Samples
+from pipeline.track import F8, Bools
+from pipeline.units import amount
+
+MOTIONLESS = 64.0 * float(np.finfo(np.float64).eps)  # relative scatter of a motionless record by IEEE rounding
+# Minimum ratio of a line's amplitude to the strongest one's; below it only one oscillation counts.
+WEAKER = 1.0 / 3.0
+MOST = 100_000  # maximum number of median spacings, whose fit takes 0.3 s as measured; longer records are not fitted
+# Frequencies of the mains and their doubles, Hz, and how far they stray: EN 50160 allows 1 % in 99.5 % of a year.
+MAINS_HZ, MAINS_SHARE = (50.0, 60.0, 100.0, 120.0), 0.01
+# Ratio to the main frequency from which a line is an overtone; the modes in windows are sought below it.
+OVERTONE = 3.4
+APART = 3.0  # least distance of two lines in reciprocals of the record's length; sidebands of a decay lie within it
+
+
+@dataclass(frozen=True, slots=True)
+class DecayingModes:
+    """The model of some decaying modes: rest position, then a, b, omega and g of each."""
+
+    def at(self, t: F8, values: F8) -> tuple[F8, Callable[[], F8]]:
+        """Return the positions (n,) at t, and a function that gives their derivatives (n, p)."""
+        total, slopes = np.full(t.size, values[0]), [np.ones_like(t)]
+        for a, b, omega, g in values[1:].reshape(-1, 4):
+            fall = np.exp(-np.clip(g * t, -20.0, 200.0))
+            cosine, sine = fall * np.cos(omega * t), fall * np.sin(omega * t)
+            wave = a * cosine + b * sine
+            total = total + wave
+            slopes += [cosine, sine, t * (b * cosine - a * sine), -t * wave]
+        return total, lambda: np.stack(slopes, axis=1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scaled:
+    """The samples used of a record, over their standard deviation, with times from the first one."""
+
+    tau: F8
+    values: F8
+    used: Bools  # (n,)
+    level: float  # mean
+    scale: float  # standard deviation
+    start_s: float
+
+    @classmethod
+    def of(cls, samples: Samples) -> Scaled | None:
+        """Return the record; None if it is too short, too long or motionless."""
+        used = samples.used & np.isfinite(samples.track.t)
+        t, y = samples.track.t[used], samples.track.y[used]
+        scale = float(np.std(y))
+        if (
+            y.size < 4 * FEWEST_FOR_CURVE
+            or scale <= MOTIONLESS * float(np.max(np.abs(y)))
+            or not 0.0 < t[-1] - t[0] < MOST * float(np.median(np.diff(t)))
+        ):
+            return None
+        level = float(y.mean())
+        return cls(t - t[0], (y - level) / scale, used, level, scale, float(t[0]))
+
+    @property
+    def seconds(self) -> float:
+        """Length of the record, s."""
+        return float(self.tau[-1])
+
+    def spectrum(self, values: F8) -> tuple[F8, F8]:
+        """Return angular frequencies, rad/s, and powers of values (n,); their times need not be equally spaced."""
+        step = float(np.median(np.diff(self.tau)))
+        grid = np.arange(int(self.tau[-1] / step) + 1) * step
+        power = np.asarray(np.abs(np.fft.rfft(np.interp(grid, self.tau, values), 8 * grid.size)) ** 2, np.float64)
+        power[:8] = 0.0  # lines below one period per record count as drift
+        return 2.0 * math.pi * np.arange(power.size, dtype=np.float64) / (8 * grid.size * step), power
+
+    def strongest(self, values: F8) -> float:
+        """Return the angular frequency of the strongest line of values (n,), rad/s."""
+        omega, power = self.spectrum(values)
+        return float(omega[np.argmax(power)])
+
+    def linear(self, *lines: tuple[float, float]) -> F8:
+        """Return the parameters of modes of given frequency and decay: rest position, then a, b, omega, g of each."""
+        columns = [np.exp(-g * self.tau) * wave(omega * self.tau) for omega, g in lines for wave in (np.cos, np.sin)]
+        solved = np.linalg.lstsq(np.stack([np.ones_like(self.tau), *columns], axis=1), self.values, rcond=None)[0]
+        each = [[solved[1 + 2 * i], solved[2 + 2 * i], *line] for i, line in enumerate(lines)]
+        return np.concatenate([solved[:1], *each])
+
+    def less(self, values: F8) -> F8:
+        """Return what modes leave of the record, (n,)."""
+        return np.asarray(self.values - DecayingModes().at(self.tau, values)[0])
+
+    def fitted(self, start: F8) -> DecayingLines | None:
+        """Fit decaying modes together; None if the record does not determine them."""
+        every = np.ones(self.tau.size, np.bool_)
+        found = fit(DecayingModes(), Rows(self.tau, self.values, every, every), start)
+        if not np.all(np.isfinite(found.covariance)):
+            return None
+        count, correlation = max(every.size - start.size, 1), correlation_length(found.residual)
+        widened = found.covariance * (float(found.residual @ found.residual) / count * correlation)
+        return DecayingLines(self, found.values, widened, found.residual, max(count / correlation, 1.0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DecayingLines:
+    """Decaying oscillations fitted together, over the scatter of the record and from its first time."""
+
+    record: Scaled
+    values: F8  # as of :class:`DecayingModes`
+    covariance: F8  # (p, p); widened by the residual and its correlation
+    residual: F8
+    dof: float  # number of independent samples less that of the parameters
+
+    @property
+    def left(self) -> float:
+        """Share of the variance that the lines do not describe."""
+        return float(self.residual @ self.residual) / self.residual.size
+
+    @property
+    def sizes(self) -> F8:
+        """Amplitudes at the start, over the scale."""
+        return np.hypot(self.values[1::4], self.values[2::4])
+
+    @property
+    def omegas(self) -> F8:
+        """Angular frequencies, rad/s."""
+        return np.abs(self.values[3::4])
+
+    @property
+    def rates(self) -> F8:
+        """Decay rates, 1/s."""
+        return np.asarray(self.values[4::4])
+
+    def leaves_noise(self, samples: Samples) -> bool:
+        """Return whether the lines leave no more than noise, whose estimates by both ways scatter as in white noise."""
+        chance = OUTLIER * math.sqrt(8.5 / self.residual.size)
+        return self.left < (1.0 + chance) * (samples.noise_of_reading / self.record.scale) ** 2
+
+    def are_several(self) -> bool:
+        """Return whether these are several oscillations, and not one that changes or is no sinusoid.
+
+        Each is at least a tenth of the strongest, lasts for several periods and does not grow, none is a multiple of
+        another. Within a bin there are only two that fall alike; others imitate a frequency that changes.
+        """
+        alike = abs(float(np.ptp(self.rates))) < 2.0 * math.sqrt(float(np.sum(np.diag(self.covariance)[4::4])))
+        omegas, rates, u = np.sort(self.omegas), self.rates, np.sqrt(np.diag(self.covariance)[4::4])
+        ratios, bins = omegas[1:] / omegas[0], np.diff(omegas) * self.record.seconds / math.tau
+        beside = np.abs(ratios - np.round(ratios)) * omegas[0] * self.record.seconds < math.tau
+        lasting = (rates < self.omegas / (math.tau * ROUNDS)) & (rates > -2.0 * u)
+        return bool(
+            omegas.size > 1
+            and np.all(lasting)
+            and np.min(self.sizes) > NEGLIGIBLE * np.max(self.sizes)
+            and not np.any(beside & (np.round(ratios) > 1.0))
+            and (np.min(bins) >= 1.0 or (omegas.size == 2 and alike))
+        )
+
+    def listed(self, unit: str) -> str:
+        """Return frequencies and amplitudes at the start in words, the strongest first."""
+        order = np.argsort(-self.sizes).tolist()
+        scale, hz = self.record.scale, self.omegas / math.tau
+        return ", ".join(f"{amount(scale * float(self.sizes[i]), unit)} at {hz[i]:.4g} Hz" for i in order)
+
+
+def find_several(samples: Samples) -> DecayingLines | None:
+    """Fit lines together, one more at a time, until they leave no more than noise; None if they are not determined.
+
+    Each one starts from the highest peak of what the others leave, or half a bin beside one that has it within a bin.
+    """
+    record = Scaled.of(samples)
+    found = None
+    for _ in range(ROUNDS if record is not None and record.tau.size <= MOST // ROUNDS else 0):
+        assert record is not None
+        lines: list[tuple[float, float]] = []
+        if found is not None:
+            lines = list(zip(found.omegas.tolist(), found.rates.tolist(), strict=True))
+        omega, decay = record.strongest(record.values if found is None else -found.residual), 0.0
+        for other, rate in lines:
+            if abs(omega - other) * record.seconds < math.tau:
+                omega, decay = other + math.copysign(math.pi / record.seconds, omega - other), rate
+        more = record.fitted(record.linear(*lines, (omega, decay)))
+        if more is None:
+            break
+        found = more
+        if found.leaves_noise(samples):
+            break
+    return found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Apart:
+    """A line that is not the free oscillation's, and that is subtracted before the analysis."""
+
+    frequency_hz: float
+    amplitude: float  # at the start
+    cause: Literal["drive", "mains", "overtone"]
+    wave: F8  # (n,) at the times of the record
+
+
+def find_apart(samples: Samples) -> Apart | None:
+    """Return the line of a drive, of the mains or of an overtone beside the free oscillation; None if there is none.
+
+    A drive keeps up its own oscillation while the free one falls. It must be the strongest line, its fall less than a
+    tenth of what the rate of the other would give it, by more than two standard uncertainties, and the other one at
+    least a third of it at the start, as after a start from rest. Mains hum may have any size. An overtone is far above
+    the strongest line, is no multiple of it, and at least a tenth of it at the start.
+    """
+    record = Scaled.of(samples)
+    # Over a long gap the interpolated values would be a slow line, and turns cannot be counted.
+    if record is None or float(np.max(np.diff(record.tau))) > NEGLIGIBLE * record.seconds:
+        return None
+    omega, power = record.spectrum(record.values)
+    first = float(omega[np.argmax(power)])
+    for second in (record.strongest(record.less(record.linear((first, 0.0)))), *_above(record, first, omega, power)):
+        start = record.linear((first, 0.0), (second, 0.0))
+        near = abs(second - first) * record.seconds < APART * math.tau
+        if near or np.hypot(*start[5:7]) < 0.5 * NEGLIGIBLE * np.hypot(*start[1:3]):
+            continue
+        lines = record.fitted(start)
+        # What the two leave beyond the noise must be below a tenth of what they describe.
+        if lines is None or lines.left > min(NEGLIGIBLE**2 + (samples.noise / record.scale) ** 2, NEGLIGIBLE):
+            continue
+        for number in (0, 1):
+            if (cause := _cause(lines, number)) is not None:
+                parameters = np.concatenate([[0.0], lines.values[1 + 4 * number : 5 + 4 * number]])
+                t = np.nan_to_num(samples.track.t - record.start_s)
+                size, hz = record.scale * float(lines.sizes[number]), float(lines.omegas[number]) / math.tau
+                return Apart(hz, size, cause, record.scale * DecayingModes().at(t, parameters)[0])
+    return None
+
+
+def _above(record: Scaled, first: float, omega: F8, power: F8) -> Iterator[float]:
+    """Yield the highest line far above the first one and beside its multiples, if it is none of the noise."""
+    beside = np.abs(omega - first * np.round(omega / first))
+    far = (omega > OVERTONE * first) & (beside > APART * math.tau / record.seconds + NOTICEABLE * omega)
+    if np.count_nonzero(far) > FEWEST_FOR_CURVE:
+        peak = float(np.max(power[far]))
+        if peak > math.log(record.tau.size / IMPROBABLE) * median(power[far]) / math.log(2.0):
+            yield float(omega[far][np.argmax(power[far])])
+
+
+def _cause(lines: DecayingLines, number: int) -> Literal["drive", "mains", "overtone"] | None:
+    """Return what keeps up one of two lines, or that it is an overtone; None if it is the free oscillation."""
+    other, sizes, omegas, rates = 1 - number, lines.sizes, lines.omegas, lines.rates
+    mains = any(abs(float(omegas[number]) / math.tau - each) < MAINS_SHARE * each for each in MAINS_HZ)
+    u_rates = np.sqrt(np.diag(lines.covariance)[4::4])
+    # The other one must last for several periods, or it is no oscillation but a disturbance at the start.
+    if rates[other] > omegas[other] / (math.tau * ROUNDS):
+        return None
+    weights = np.zeros(9)
+    weights[[4 + 4 * number, 4 + 4 * other]] = 1.0, -NEGLIGIBLE
+    u = math.sqrt(float(weights @ lines.covariance @ weights))
+    # The other one falls to its half at least, far beyond its uncertainty.
+    falls = rates[other] > max(OUTLIER * u_rates[other], math.log(2.0) / lines.record.seconds)
+    if falls and float(weights @ lines.values) < -2.0 * u and (mains or (number == 0 and sizes[1] > WEAKER * sizes[0])):
+        return "mains" if mains else "drive"
+    if number == 0 or omegas[1] < OVERTONE * omegas[0] or sizes[1] < NEGLIGIBLE * sizes[0]:
+        return None
+    if omegas[0] * lines.record.seconds < FEWEST_FOR_CURVE * math.tau:
+        return None  # a slow line of few periods may be a rest position that moves
+    if rates[1] > omegas[1] / (math.tau * ROUNDS) or rates[1] < -2.0 * u_rates[1]:
+        return None
+    return "mains" if mains and rates[1] < OUTLIER * u_rates[1] else "overtone"

@@ -1,0 +1,194 @@
+"""The window on the network: its page, what pages send and are sent, and when its server ends."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import socket
+from collections.abc import AsyncIterator, Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from springmass.loading.load import sample_data
+from springmass.page.web.security import ACT, Access
+from springmass.page.web.server import PAGE_FILES, server_of, static_files
+from springmass.page.window.cards import Cards, NotTaken
+
+DESERTED_S, FIRST_S = 60.0, 600.0
+"""Time after which the server ends when the last page is gone, and when none ever came."""
+LONGEST_REQUEST = 1 << 18
+OWN_HEADER = ("x-springmass", "window")
+"""A header that no page of another origin can send without being asked first, and the answer to that is no."""
+TAKEN = {"results.csv": "report/results.csv", "table.tex": "report/table.tex", "results.json": "report/results.json"}
+
+
+class Window:
+    """What pages may ask of the cards, and how many pages there are."""
+
+    def __init__(self, cards: Cards) -> None:
+        self._cards, self.pages = cards, 0
+        self.quiet_s = DESERTED_S - FIRST_S
+
+    async def do(self, asked: Mapping[str, Any]) -> Response:
+        """Carry out what a page asks."""
+        cards, card = self._cards, str(asked.get("card", ""))
+        match asked.get("do"):
+            case "open":
+                await cards.open_drop(str(asked["drop"]), card)
+            case "examples":
+                await cards.examples(sample_data())
+            case "change":
+                cards.change(card, asked["changes"])
+            case "separate":
+                cards.separate(card)
+            case "stop":
+                cards.stop(card)
+            case "remove":
+                cards.remove(card)
+            case "write":
+                await cards.write(card, str(asked["what"]))
+            case "judge":
+                return JSONResponse(await cards.judge(card, asked["rows"]))
+            case "compare":
+                return FileResponse(await cards.compare(asked), media_type="application/json")
+            case "restore" | "forget":
+                cards.restore(str(asked["window"]), forget=asked["do"] == "forget")
+            case _:
+                raise NotTaken("the window does no such thing")
+        return JSONResponse({})
+
+    async def attend(self, browser: WebSocket) -> None:
+        """Send a page everything, and then what changes; it is gone when its connection closes."""
+        await browser.accept()
+        self.pages += 1
+        sending = asyncio.create_task(self._send(browser))
+        try:
+            with contextlib.suppress(WebSocketDisconnect):
+                await browser.receive_text()  # a page only listens here
+                await browser.close(1003)
+        finally:
+            self.pages -= 1
+            sending.cancel()
+            await asyncio.gather(sending, return_exceptions=True)
+
+    async def _send(self, browser: WebSocket) -> None:
+        revision = -1
+        while True:
+            turned, messages = self._cards.turned(), self._cards.since(revision)
+            revision = self._cards.revision
+            for message in messages:
+                await browser.send_text(json.dumps(message))
+            await turned
+
+    async def reading(self, over: Callable[[], None], busy: Callable[[], bool]) -> None:
+        """Call ``over`` once no page has been there for a while and nothing is recorded."""
+        self._cards.children.prepare()
+        while True:
+            await asyncio.sleep(1.0)
+            self._cards.touch()
+            self.quiet_s = 0.0 if self.pages or busy() else self.quiet_s + 1.0
+            if self.quiet_s >= DESERTED_S:
+                over()
+
+
+def application(window: Window, cards: Cards, life: Callable[[Starlette], Any]) -> Starlette:
+    """Return the window as an ASGI application without access control."""
+
+    async def main(_: Request) -> Response:
+        return FileResponse(PAGE_FILES / "window.html")
+
+    async def changing(request: Request, work: Callable[[], Any]) -> Response:
+        """Do what changes something only for the page itself: its cookie, its origin and its header."""
+        owns = ACT in request.auth.scopes and "origin" in request.headers
+        if not owns or request.headers.get(OWN_HEADER[0]) != OWN_HEADER[1]:
+            return PlainTextResponse("springmass: only the window itself may change something\n", 403)
+        try:
+            done: Response = await work()
+        except NotTaken as error:
+            return JSONResponse({"refused": str(error)}, 409)
+        except (KeyError, TypeError, ValueError, AttributeError, RecursionError):
+            return JSONResponse({"refused": "the window takes no such request"}, 400)
+        return done
+
+    async def receive(request: Request) -> Response:
+        async def work() -> Response:
+            drop, folder, name = (request.query_params[each] for each in ("drop", "folder", "name"))
+            await cards.receive(drop, folder, name, request.stream())
+            return JSONResponse({})
+
+        return await changing(request, work)
+
+    async def do(request: Request) -> Response:
+        async def work() -> Response:
+            content = b""
+            async for data in request.stream():
+                content += data
+                if len(content) > LONGEST_REQUEST:
+                    raise ValueError
+            return await window.do(json.loads(content))
+
+        return await changing(request, work)
+
+    async def taken(request: Request) -> Response:
+        try:
+            card = cards.card(request.path_params["card"])
+        except NotTaken as error:
+            return PlainTextResponse(f"springmass: {error}\n", 404)
+        what = request.path_params["what"]
+        files = {
+            "shown": "results.json",
+            "report": "report/report.html",
+            "figures.zip": "figures.zip",
+            "run.h5": "run.h5",
+        }
+        path = card.folder / (files | TAKEN).get(what, "nothing")
+        if not path.is_file():
+            return PlainTextResponse("springmass: this has not been made yet\n", 404)
+        if what in ("shown", "report"):
+            return FileResponse(path, media_type="application/json" if what == "shown" else "text/html")
+        return FileResponse(
+            path,
+            filename=f"{Path(card.kept['name']).stem}{'.' if what == 'run.h5' else '-'}{what.removeprefix('run.')}",
+        )
+
+    routes = [
+        Route("/", main),
+        Route("/window/files", receive, methods=["POST"]),
+        Route("/window/do", do, methods=["POST"]),
+        Route("/window/cards/{card}/{what}", taken),
+        WebSocketRoute("/window/events", window.attend),
+        *static_files(),
+    ]
+    return Starlette(routes=routes, lifespan=life)
+
+
+def serve_window(cards: Cards, begin: Callable[[], None], *, port: int, opened: Callable[[str, str], None]) -> None:
+    """Serve the window until nobody looks at it any more; OSError if the port is taken.
+
+    ``begin`` is called once the server runs, ``opened`` with its address.
+    """
+    with socket.create_server(("127.0.0.1", port)) as listener:
+        port = listener.getsockname()[1]
+        access, window = Access(port), Window(cards)
+
+        @contextlib.asynccontextmanager
+        async def life(_: Starlette) -> AsyncIterator[None]:
+            begin()
+            opened(f"http://127.0.0.1:{port}/?token={access.token}", "")
+            ticking = asyncio.create_task(window.reading(lambda: setattr(server, "should_exit", True), lambda: False))
+            try:
+                yield
+            finally:
+                ticking.cancel()
+                await cards.close()
+
+        # A page whose computer sleeps does not answer, and is not gone.
+        server = server_of(application(window, cards, life), access, ping_s=None)
+        server.run(sockets=[listener])

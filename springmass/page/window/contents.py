@@ -1,0 +1,161 @@
+"""What a card shows of a recording, as data: how it was read, what it asks, its results."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from acquisition.errors import NeedsAnswer, visible
+from acquisition.recordings.identify import get_format
+from acquisition.recordings.questions import Missing, MissingItem
+from springmass.charts.chart import Chart, to_json
+from springmass.charts.run import charts_of, recording
+from springmass.comparing.comparison import SpringComparison, line_and_hooke_words
+from springmass.comparing.reported import Reported
+from springmass.loading.loaded import Loaded
+from springmass.report.html import tables_of
+from springmass.report.recorded import bench_words, date_words, notes_of
+from springmass.report.words import method, summary
+from springmass.result.advice import notices_of, sentence
+from springmass.runs.run import Run
+from springmass.typeset import cells, pretty, typeset
+
+LABELS = {
+    Missing.RUN: "Run",
+    Missing.CHANNEL: "Column of values",
+    Missing.TIME: "Column of times",
+    Missing.RATE_HZ: "Rate",
+    Missing.TIME_UNIT: "Unit of the times",
+    Missing.UNIT: "Unit",
+}
+FIELD_OF = {
+    "unit": "Unit",
+    "time-unit": "Unit of the times",
+    "time": "Column of times",
+    "rate-hz": "Rate",
+    "from": "From",
+    "to": "To",
+    "law": "Law",
+    "mass-kg": "Mass of the bob",
+    "set": "Mass of the spring",
+    "clock-ppm": "Error of the clock",
+}
+"""The field of the window that stands for an option of the command line."""
+OWN_FORMATS = {"run": "run file of springmass", "wire": "log of a recording"}
+
+
+def in_fields(text: str) -> str:
+    """Return an advice with the fields of the window in place of the options of a command line.
+
+    >>> in_fields("For the spring constant, state the mass: --mass-kg KG.")
+    'For the spring constant, state the mass: the field "Mass of the bob".'
+    """
+    words = r"--([a-z]+(?:-[a-z]+)*)( KG| any| spring\.\S+(?<!\.)| \d\S*(?<!\.))?"
+    return re.sub(words, lambda found: f'the field "{FIELD_OF.get(found[1], found[1])}"', text)
+
+
+def opened(loaded: Loaded) -> dict[str, Any]:
+    """Return how a recording was read, with an outline of its samples."""
+    track = loaded.track
+    times = track.t[track.t == track.t]
+    return {
+        "format": OWN_FORMATS.get(loaded.format) or get_format(loaded.format).title,
+        "facts": [
+            *filter(None, [visible(loaded.title), loaded.channel and f"values from “{visible(loaded.channel)}”"]),
+            f"{len(track)} samples",
+            f"{track.rate_hz:.5g} Hz",
+            f"{float(times.max() - times.min()) if times.size else 0.0:.4g} s",
+        ],
+        "recorded": date_words(loaded.provenance),
+        "simulated": loaded.info.kind == "simulated",
+        "assumed": [sentence(visible(trap.message)) for trap in loaded.traps],
+        "reading": {name: str(value) for name, value in loaded.reading.items() if name != "velocity"},
+        "outline": to_json(recording(track)),
+    }
+
+
+def asked(error: NeedsAnswer) -> dict[str, Any]:
+    """Return a question as fields, with the first rows of the table."""
+    question = error.question
+    needs = [each for need in question.needs for each in (need, need.instead) if each is not None]
+    reason = question.reason or ("" if question.columns else question.sentence)
+    return {
+        "reason": sentence(visible(reason)) if reason else "",
+        "times": visible(question.times),
+        "fields": [_field(need) for need in needs],
+        "rows": [[visible(cell) for cell in row] for row in question.rows],
+    }
+
+
+def _field(need: MissingItem) -> dict[str, Any]:
+    label = LABELS[need.what]
+    if need.what is Missing.UNIT:
+        label = f"Unit of {visible(need.of) or 'the values'}"
+        if need.stated:
+            label += f" (the file says {visible(need.stated)})"
+    return {"name": need.what.value, "label": label, "choices": [visible(each) for each in need.choices]}
+
+
+def results_of(run: Run) -> dict[str, Any]:
+    """Return the results of an analysed run: the table, the sentences, the findings and the charts of its report."""
+    analysis = run.analysis
+    charts = charts_of(analysis, notes_of(run.recorded))
+    (table,) = tables_of([run])
+    grades = run.result["grades"]
+    notices = notices_of(run.result["findings"], charts)
+    return {
+        "rows": [
+            {
+                "name": row.name,
+                "quantity": row.quantity,
+                "symbol": row.page_symbol,
+                "value": pretty(x) if (x := row.estimates[0]) is not None else "",
+                "cells": cells(x),
+                "note": in_fields(row.note),
+                "grade": table["grades"][row.name].grade if row.name in table["grades"] else "",
+                "why": table["grades"][row.name].why if row.name in table["grades"] else "",
+            }
+            for row in table["rows"]
+        ],
+        "sound": table["all_sound"],
+        "graded": bool(grades),
+        "estimates": run.result["estimates"],
+        "summary": [[title, in_fields(text)] for title, text in summary(analysis)],
+        "findings": [
+            {**notice, "advice": in_fields(notice["advice"])} for notice in [*notices["warnings"], *notices["notes"]]
+        ],
+        "method": [in_fields(text) for text in method(analysis)],
+        "bench": bench_words(analysis.scene).partition(";")[0],
+        "law": run.law,
+        "charts": drawn(charts),
+    }
+
+
+def drawn(charts: Mapping[str, Chart]) -> list[dict[str, Any]]:
+    """Return charts for charts.js, with their captions."""
+    return [to_json(chart) | {"caption": chart.caption} for chart in charts.values()]
+
+
+def compared_of(compared: SpringComparison, charts: Mapping[str, Chart]) -> dict[str, Any]:
+    """Return a comparison: the verdict, a row for each run and for their mean, and its charts."""
+    springs = compared.comparison
+    each = zip(springs.names, springs.each, springs.pulls, strict=True)
+    rows = [[name, pretty(k), f"{pull:+.1f}".replace("-", "−")] for name, k, pull in each]
+    if springs.agree:
+        rows.append(["weighted mean", pretty(springs.spring_constant), ""])
+    texts = [springs.message, *line_and_hooke_words(compared), *(joint.message for joint in compared.joint)]
+    return {
+        "verdict": typeset(" ".join(texts)),
+        "rows": rows,
+        "findings": [in_fields(finding.advice) for finding in compared.findings if finding.advice],
+        "charts": drawn(charts),
+    }
+
+
+def judged(rows: Sequence[Reported]) -> list[dict[str, str]]:
+    """Return the verdict on each value that a report states."""
+    return [
+        {"name": row.name, "printed": typeset(row.printed), "ours": pretty(row.found), "verdict": row.verdict}
+        for row in rows
+    ]

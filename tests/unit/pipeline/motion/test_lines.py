@@ -1,0 +1,70 @@
+"""Which of several lines is analysed: one that a drive or the mains keep up is not, and twice a frequency is named."""
+
+from __future__ import annotations
+
+import pytest
+
+from pipeline.analyse import analyse
+from pipeline.bench.scene import Scene
+from pipeline.errors import SceneError
+from pipeline.track import Track
+from tests.trials.grades import kinds
+
+
+@pytest.mark.parametrize("kind", ["driven", "mains-hum"])
+def test_what_falls_is_analysed_beside_a_steady_line(kind: str) -> None:
+    """Period, spring constant and damping rate are those of the free motion, and the steady one is named."""
+    record = kinds.trouble(kind, 0)
+    said = record.said()
+    errors = said.errors(record.truth)
+    assert errors
+    assert max(map(abs, errors.values())) < 4.0
+    assert "driven" in said.warnings
+
+
+def test_an_overtone_does_not_disturb_the_lowest_oscillation() -> None:
+    """It is named and subtracted, also if it is as large at first and far above the other."""
+    record = kinds.trouble("cantilever-overtone", 0)
+    said = record.said()
+    assert max(map(abs, said.errors(record.truth).values())) < 4.0
+    assert said.warnings == {"overtone"}
+
+
+@pytest.mark.parametrize(("kind", "count"), [("three-modes", 3), ("close-modes", 2)])
+def test_oscillations_that_overlap_are_listed(kind: str, count: int) -> None:
+    """Frequencies and sizes are listed where one oscillation does not describe the record, and no period is sound."""
+    for seed in range(3):
+        record = kinds.trouble(kind, seed)
+        findings = {each.code: each for each in analyse(Track.from_arrays(record.t, record.y)).findings}
+        found = findings.get("several_lines") or findings["no_oscillation"]
+        assert found.message.count(" Hz") == count
+        assert not any(value.sound for name, value in record.said().values.items() if name.startswith("period"))
+
+
+@pytest.mark.parametrize("kind", ["magnitude", "radial-acceleration", "magnet-pendulum"])
+def test_two_cycles_in_each_of_the_motion_are_named(kind: str) -> None:
+    """No value is sound, and the period of the motion is offered."""
+    record = kinds.trouble(kind, 1)
+    said = record.said()
+    assert not any(value.sound for value in said.values.values())
+    analysis = analyse(Track.from_arrays(record.t, record.y, unit=record.unit))
+    offered = next(finding.values["motion_s"] for finding in analysis.findings if finding.code == "half_frequency")
+    period = record.truth["period"]
+    low, high = period if isinstance(period, tuple) else (period, period)
+    assert 0.999 * low < offered < 1.001 * high
+
+
+def test_nothing_asks_for_a_spring_where_there_is_none() -> None:
+    """A slow torsion balance raises nothing, and has no spring constant, if the scene says that no spring bears it."""
+    record = kinds.trouble("cavendish-spot", 1)
+    track = Track.from_arrays(record.t, record.y)
+    assert "implausible_sag" in {each.code for each in analyse(track).findings}
+    scene = Scene.from_mapping({"bob": {"mass_kg": {"value": 0.1, "u": 1e-4}}, "spring": {"none": True}})
+    assert Scene.from_mapping(scene.to_mapping()) == scene
+    analysis = analyse(track, scene)
+    assert {each.code for each in analysis.findings if each.severity != "info"} == {"short_record"}
+    assert "spring_constant" not in analysis.estimates
+    assert abs(analysis.estimates["period"].value / record.truth["period"] - 1.0) < 0.01  # type: ignore[operator]
+    for wrong in ({"none": "perhaps"}, {"none": True, "mass_kg": 0.01}):
+        with pytest.raises(SceneError):
+            Scene.from_mapping({"spring": wrong})
