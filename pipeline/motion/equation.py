@@ -10,7 +10,7 @@ The model, :class:`Solved`, is the free motion of a bob at any times and for any
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -24,7 +24,7 @@ from pipeline.dynamics.integrator import Trajectory
 from pipeline.dynamics.strang import STRANG
 from pipeline.modes.mode import Modes
 from pipeline.motion.fit import Rows, clipped, fit
-from pipeline.motion.fitted import Oscillation, Phase, Refused, RestPosition, Waveform, wrapped
+from pipeline.motion.fitted import Oscillation, Phase, Refusal, RestPosition, Waveform, wrapped
 from pipeline.motion.relaxation import LEAST_DAMPING
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import CENTRAL_STEP, Fit, central_differences
@@ -191,7 +191,7 @@ LONGEST_SOLVED = 250
 
 def fit_equation(
     samples: Samples, windows: Windows, damping: Damping, *, stopped: bool
-) -> Oscillation | Refused | None:
+) -> Oscillation | Refusal | None:
     """Fit the equation of motion if the damping requires it, or refuse it.
 
     The result is None if damping is weak, if no law with damping can be fitted, or if linear drag or no damping is
@@ -209,7 +209,7 @@ def fit_equation(
         return None
     periods = windows.angular_frequency / (2.0 * math.pi) * float(np.ptp(windows.t))
     if ratio <= NOTICEABLE and periods > LONGEST_SOLVED:
-        return Refused("too_long", {"periods": periods, "most_periods": LONGEST_SOLVED})
+        return Refusal("too_long", {"periods": periods, "most_periods": LONGEST_SOLVED})
     numbers: dict[str, float | str] = {"damping_ratio": ratio, "law": laws[-1].words}
     rows, size = _rows(samples, windows, damping), abs(float(damping.best.joint.values[0]))
     motion, expected = FreeMotion(float(np.max(rows.t)), windows.angular_frequency, size), rows.u
@@ -225,16 +225,17 @@ def fit_equation(
         if noise <= MISFIT * scatter:
             break
     else:
-        return Refused("misfit", {**numbers, "rms_m": noise, "noise_m": scatter})
+        return Refusal("misfit", {**numbers, "rms_m": noise, "noise_m": scatter})
     noise = max(noise, 0.01 * expected)
     correlation, rows = correlation_length(left), replace(rows, u=noise)
     chosen = _chosen(models, rows, found.values, correlation, damping, samples.track.unit)
     if chosen is None:
-        return Refused("no_minimum", numbers)
-    damping, model, own = chosen
+        return Refusal("no_minimum", numbers)
+    damping, fits = chosen
+    model = next(model for model in models if model.law is damping.best.law)
     if damping.best.rate_at_start() < 0.0:
-        return Refused("driven", {"law": model.law.words})
-    return _described(samples, windows, damping, model, rows, own)
+        return Refusal("driven", {"law": model.law.words})
+    return _described(samples, windows, damping, model, rows, fits)
 
 
 def _fittable(damping: Damping) -> list[Drag]:
@@ -325,8 +326,8 @@ def _by_first_samples(models: Sequence[Solved], rows: Rows, omega: float) -> Ite
 
 def _chosen(
     models: Sequence[Solved], rows: Rows, start: F8, correlation: float, damping: Damping, unit: str
-) -> tuple[Damping, Solved, Fit] | None:
-    """Fit the laws from the solution of the last, and select one; None if no fit has a finite covariance.
+) -> tuple[Damping, dict[str, Fit]] | None:
+    """Fit the laws from the solution of the last, and select among them; None if no fit has a finite covariance.
 
     The other laws are restrictions of the last, from whose minimum theirs follow to first order. Then only the selected
     law is fitted, and those that chi-square does not clearly reject.
@@ -369,8 +370,7 @@ def _chosen(
         unfitted=unfitted,
         stated=damping.stated,
     )
-    own = fits[choice.selected]
-    return every, by_name[choice.selected], replace(own, covariance=own.covariance * correlation)
+    return every, {name: replace(own, covariance=own.covariance * correlation) for name, own in fits.items()}
 
 
 def _restricted(whole: Fit, richest: Solved, model: Solved) -> Fit:
@@ -405,13 +405,14 @@ def _by_envelope(model: Solved, own: Fit) -> Fit:
 
 
 def _described(
-    samples: Samples, windows: Windows, damping: Damping, model: Solved, rows: Rows, own: Fit
-) -> Oscillation | Refused:
+    samples: Samples, windows: Windows, damping: Damping, model: Solved, rows: Rows, fits: Mapping[str, Fit]
+) -> Oscillation | Refusal:
     """Return the oscillation by the solution, unless its drag leaves none.
 
     Its squared frequency is :math:`\\omega_0^2` minus the mean decrease by drag over the whole time: to second order,
-    that of a line through the turning points.
+    that of a line through the turning points. Its u includes the scatter of this frequency over the admissible laws.
     """
+    own = fits[damping.selected]
     theta, best, unit = model.full(own.values), damping.best, samples.track.unit
     still, y, v, natural = theta[: len(STATE)].tolist()
     position = model.motion.position(rows.t, theta)
@@ -426,10 +427,13 @@ def _described(
         + amount(rms, unit)
     )
     t, t0, u = windows.t, damping.t0, np.sqrt(np.diag(own.covariance))
-    squared_rate = mean_squared_rate(best, best.amplitude(t - t0), np.ones(t.size))
-    if not squared_rate < natural**2:
-        return Refused("no_frequency", {"damping_ratio": best.rate_at_start() / natural, "law": model.law.words})
+    rates = {n: mean_squared_rate(x, x.amplitude(t - t0), np.ones(t.size)) for n, x in damping.considered.items()}
+    if not (squared_rate := rates[damping.selected]) < natural**2:
+        return Refusal("no_frequency", {"damping_ratio": best.rate_at_start() / natural, "law": model.law.words})
     omega = math.sqrt(natural**2 - squared_rate)
+    away = np.array([fits[n].values[3] ** 2 - rate - omega**2 for n, rate in rates.items()]) / (2.0 * omega)
+    odds = np.array([math.exp(0.5 * min(best.bic - x.bic, 0.0)) for x in damping.considered.values()])
+    u_omega = math.hypot(float(u[3]) * natural / omega, math.sqrt(float(odds @ away**2) / float(odds.sum())))
     slope = np.array([0.0, v * natural, -y * natural, y * v]) / (v**2 + (y * natural) ** 2)
     u_phase = math.sqrt(float(slope @ own.covariance[: len(STATE), : len(STATE)] @ slope))
     _, start, _ = envelope(*theta[1:].tolist())
@@ -439,7 +443,7 @@ def _described(
     centre = start + 2.0 * math.pi * turns + omega * (middle - t0)
     phase = Phase(
         t0=t0,
-        angular_frequency=Estimate(omega, float(u[3]) * natural / omega, "rad/s"),
+        angular_frequency=Estimate(omega, u_omega, "rad/s"),
         phase=Estimate(wrapped(start), u_phase, "rad"),
         backbone=None,
         reduced_chi2=best.reduced_chi2,

@@ -93,15 +93,15 @@ class Waveform:
         return self.moving()
 
 
-RefusedFor = Literal["too_long", "misfit", "no_minimum", "driven", "no_frequency"]
+RefusalCode = Literal["too_long", "misfit", "no_minimum", "driven", "no_frequency"]
 """It takes too long to solve, leaves more than noise, has no minimum, or its best law drives the motion or stops it."""
 
 
 @dataclass(frozen=True, slots=True)
-class Refused:
+class Refusal:
     """Why the equation of motion was not fitted, although the damping requires it: a code and its numbers."""
 
-    code: RefusedFor
+    code: RefusalCode
     numbers: Mapping[str, float | str]  # as the sentences of "not_converged" call them
 
 
@@ -121,7 +121,7 @@ class Oscillation:
     waveform: Waveform  # including the modes
     method: Method
     why: str  # what a method that failed, or the equation of motion, came to
-    refused: Refused | None  # of the equation of motion
+    refused: Refusal | None  # of the equation of motion
 
     @property
     def flags(self) -> U8:

@@ -11,7 +11,7 @@ from pipeline.motion.at_rest import Rest, rest_of
 from pipeline.motion.averaged import check_coherence, fit_windows, typical_miss
 from pipeline.motion.by_samples import FEW_WINDOWS, fit_samples
 from pipeline.motion.equation import fit_equation
-from pipeline.motion.fitted import Oscillation, Refused
+from pipeline.motion.fitted import Oscillation, Refusal
 from pipeline.motion.lines import WEAKER, find_several
 from pipeline.motion.relaxation import LEAST_DAMPING, Relaxation, find_relaxation
 from pipeline.motion.two_modes import TwoModes, find_two_modes
@@ -42,7 +42,7 @@ def fit_motion(part: Part, options: Options) -> Motion:
     laws = fit_laws(windows, start_s, options.laws, options.known_law, samples.track.unit, coarse=coarse)
     solved = fit_equation(samples, windows, laws, stopped=part.stopped)
     fitted = solved if isinstance(solved, Oscillation) else _averaged(windows, modes, laws, samples, options)
-    if isinstance(solved, Refused):
+    if isinstance(solved, Refusal):
         fitted = replace(fitted, refused=solved)
     if _may_relax(fitted, laws) and isinstance(relaxed := find_relaxation(samples), Relaxation):
         return relaxed
