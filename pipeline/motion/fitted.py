@@ -17,6 +17,7 @@ from pipeline.numerics.levels import NOTICEABLE
 from pipeline.numerics.regression import Scatter
 from pipeline.track import F8, U8
 from pipeline.windows.demodulate import Windows
+from pipeline.windows.walk import Walk
 
 TimeTable = tuple[F8, F8]  # values at ascending times, s
 
@@ -38,6 +39,7 @@ class Phase:
     lag: TimeTable | None = None  # delay of a period's sinusoid, rad; None if it is constant
     small_swings: Estimate | None = None  # angular frequency of very small swings; with a backbone or of a pendulum
     of_pendulum: bool = False  # whether these follow from the law of a pendulum
+    walk: Walk | None = None  # of amplitude and phase, if they wander at random; the frequency is that of the walk
     spread: Scatter | None = None  # of the windows' phases about a smooth curve; None of a single window
     squared_rate: float | None = None  # decrease of the squared frequency by drag, 1/s^2; None: that of the windows
 

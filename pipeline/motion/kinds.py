@@ -36,10 +36,14 @@ def fit_motion(part: Part, options: Options) -> Motion:
         return _without_cycles(samples, windows)
     if (bent := check_sinusoid(samples, windows)) is not None:
         return _without_cycles(samples, bent)
-    windows, modes = separate(samples, windows, sought=options.modes)
+    windows, modes = separate(samples, windows, sought=options.modes and part.walk is None)
     windows = rounded(windows, samples.quantum)
     start_s, coarse = start_of(samples, windows.angular_frequency), (samples.quantum or 0.0) > COARSE * windows.noise
     laws = fit_laws(windows, start_s, options.laws, options.known_law, samples.track.unit, coarse=coarse)
+    if part.walk is not None:
+        fitted = fit_windows(windows, modes, laws)
+        phase = replace(fitted.phase, angular_frequency=part.walk.angular_frequency, walk=part.walk)
+        return replace(fitted, phase=phase)
     solved = fit_equation(samples, windows, laws, stopped=part.stopped)
     fitted = solved if isinstance(solved, Oscillation) else _averaged(windows, modes, laws, samples, options)
     if isinstance(solved, Refusal):
