@@ -14,6 +14,7 @@ from pipeline.motion.fitted import Oscillation
 from pipeline.numerics.levels import NEGLIGIBLE
 from pipeline.numerics.robust import median
 from pipeline.samples.condition import Samples
+from pipeline.windows.cycles import aliased
 
 
 class Limit(NamedTuple):
@@ -35,9 +36,10 @@ def _no_distance(numbers: Mapping[str, float]) -> Misfit:
     return Misfit(name="implausible_distance", offset=max(numbers["amplitude_m"], numbers["rest_m"]))
 
 
+# Below two samples per period the frequency is aliased, and below four noise decides; uneven times have no aliases.
+ENOUGH = 4.0
 LIMITS = (
-    # Below two samples per period the frequency is aliased, and below four noise decides.
-    Limit("undersampled", "samples_per_period", ("samples_per_period",), least=4.0),
+    Limit("undersampled", "samples_per_period", ("samples_per_period",), least=ENOUGH),
     # A bob on a spring that can only pull reaches 1, and little more if the spring goes slack.
     Limit("implausible_motion", "gravities", ("gravities", "amplitude_m", "frequency_hz"), most=1.2, misfit=_too_fast),
     # Extension of the spring by the bob at rest: 25 m correspond to a period of 10 s.
@@ -76,8 +78,9 @@ def _numbers(samples: Samples, fitted: Oscillation) -> dict[str, float]:
     omega, amplitude = fitted.phase.angular_frequency.value, float(np.max(np.abs(windows.amplitude)))
     f, rest = omega / (2.0 * math.pi), abs(float(np.mean(windows.offset)))
     per_value = {"m": omega**2, "m/s": omega, "m/s^2": 1.0}.get(track.unit, math.nan)
+    per_period = 1.0 / (median(np.diff(t)) * f) if t.size > 1 else math.nan
     numbers = {
-        "samples_per_period": 1.0 / (median(np.diff(t)) * f) if t.size > 1 else math.nan,
+        "samples_per_period": math.nan if per_period < ENOUGH and not aliased(t) else per_period,
         "frequency_hz": f,
         "period_s": 1.0 / f,
         "amplitude_m": amplitude,

@@ -215,8 +215,11 @@ def find_apart(samples: Samples) -> Apart | None:
     the strongest line, is no multiple of it, and at least a tenth of it at the start.
     """
     record = Scaled.of(samples)
-    # Over a long gap the interpolated values would be a slow line, and turns cannot be counted.
-    if record is None or float(np.max(np.diff(record.tau))) > NEGLIGIBLE * record.seconds:
+    if record is None:
+        return None
+    steps = np.diff(record.tau)
+    # Over a long gap, or at uneven times, interpolated values would have other lines.
+    if float(np.max(steps)) > NEGLIGIBLE * record.seconds or float(np.std(steps)) > 0.5 * float(np.mean(steps)):
         return None
     omega, power = record.spectrum(record.values)
     first = float(omega[np.argmax(power)])

@@ -23,6 +23,9 @@ SAMPLES_PER_WINDOW = 12
 # Maximum standard uncertainty of a window's phase due to noise, rad; windows span as many whole periods as this needs.
 # The probability that two of them differ by half a turn is 1e-28.
 U_PHASE = 0.2
+# Highest frequency that is sought at uneven times, over their mean rate; a search up to it takes as long as an FFT of
+# sixteen times as many values.
+BEYOND = 4.0
 # Maximum number of windows; longer records have longer windows, not more of them. An analysis of 10,000 windows takes
 # 0.6 s, measured on 260,000 samples.
 MOST_WINDOWS = 20_000
@@ -73,7 +76,7 @@ def find_cycles(samples: Samples) -> Cycles | NoOscillation:
             f"the {noun(track.unit)} stays within {amount(spread, track.unit, '.3g')} at "
             f"{amount(median(y), track.unit, '.4g')}: the sensor saw something at rest"
         )
-    line = _spectral_line(t, y, track.t, track.rate_hz)
+    line = _uneven_line(t, y) or _spectral_line(t, y, track.t, track.rate_hz)
     if line is None:
         middle = median(y)
         if mad_sigma(y - middle) <= MISFIT * samples.noise:
@@ -118,6 +121,45 @@ def _spectral_line(t: F8, y: F8, recorded: F8, rate_hz: float) -> tuple[float, f
         if ratio >= threshold:
             return frequency_hz, 2.0 * math.sqrt(power) / float(window.sum())
     return None
+
+
+def uneven_spectrum(t: F8, values: F8) -> tuple[float, NDArray[np.complex128]]:
+    """Return the spacing, Hz, and the spectrum of values (n,) at uneven times, far beyond half of their mean rate.
+
+    Each value counts at the nearest point of a grid that is much finer than the mean interval, which turns the phase of
+    the highest frequency by an eighth of a turn at most.
+    """
+    fine_hz = 4.0 * BEYOND * (t.size - 1) / float(t[-1] - t[0])
+    index = np.round((t - t[0]) * fine_hz).astype(np.int64)
+    size = 2 << int(index[-1]).bit_length()
+    return fine_hz / size, np.fft.rfft(np.bincount(index, values, size))[: size // 4]
+
+
+def _uneven_line(t: F8, y: F8) -> tuple[float, float] | None:
+    """Return frequency and mean amplitude of the strongest line if it is above half of the mean rate.
+
+    None if the times are even or have aliases, or if the line may be noise.
+    """
+    steps = np.diff(t)
+    if float(np.std(steps)) < NEGLIGIBLE * float(np.mean(steps)) or aliased(t):
+        return None
+    spacing, line = uneven_spectrum(t, y - y.mean())
+    power = np.abs(line) ** 2
+    first = math.ceil(0.5 * (t.size - 1) / float(t[-1] - t[0]) / spacing)
+    k = first + int(np.argmax(power[first:]))
+    if power[k] < max(math.log(power.size / IMPROBABLE) * float(power.mean()), float(power[:first].max())):
+        return None
+    return k * spacing, 2.0 * math.sqrt(float(power[k])) / t.size
+
+
+def aliased(t: F8) -> bool:
+    """Return whether a line at another frequency, a few mean rates away at most, looks much like one at the times (n,).
+
+    The other one explains the square of the spectral window as a share of the variance; a half is much.
+    """
+    spacing, line = uneven_spectrum(t, np.ones(t.size))
+    own = math.ceil(2.0 / (spacing * float(t[-1] - t[0])))
+    return bool(np.max(np.abs(line[own:]), initial=0.0) ** 2 > 0.5 * t.size**2)
 
 
 def _bridged(grid: F8, t: F8, y: F8, recorded: F8, hole_s: float) -> F8:

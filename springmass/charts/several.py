@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from acquisition.errors import visible
 from pipeline.analyse import Analysis
 from pipeline.bench.disc import STEADY_DISC_DRAG, disc_drag_coefficient
+from pipeline.numerics.estimate import Estimate
 from pipeline.several.compare import Comparison
 from pipeline.several.masses import Hooke, MassLine
 from pipeline.track import F8
@@ -104,22 +106,48 @@ def static(hooke: Hooke) -> Chart:
     return Chart("hooke", "Hooke's law", caption, (Panel("position / mm", tuple(series), x_label=x_label),))
 
 
-def course(label: str, rows: Sequence[tuple[str, float, float]], differing: Mapping[str, str]) -> Chart:
-    """One quantity of all runs of a course, each row a name with value and uncertainty.
+class CourseValue(NamedTuple):
+    """One quantity of a run: its place on the axis is that of its group."""
+
+    run: str
+    group: str
+    value: float
+    u: float
+
+
+def course(
+    label: str, x_label: str, rows: Sequence[CourseValue], differing: Mapping[str, str], mean: Estimate | None = None
+) -> Chart:
+    """One quantity of all runs of a course, with their mean, the runs of a group beside one another.
 
     Runs that differ from the others are given by name with a sentence each; those beyond the axis stand at its edge.
     """
-    names, y, u = zip(*rows, strict=True)
-    x, values, us = np.arange(1.0, len(rows) + 1.0), np.array(y), np.array(u)
-    apart = np.array([name in differing for name in names])
-    good, why = ~apart, tuple(f"{name}: {differing[name]}" for name in names if name in differing)
-    series = [Series("value ± u", x[good], values[good], u=us[good])]
+    groups: dict[str, list[CourseValue]] = {}
+    for row in rows:
+        groups.setdefault(row.group, []).append(row)
+    x, ordered = [], []
+    for place, group in enumerate(groups.values(), 1):
+        x += [place + GROUP_WIDTH * ((i + 0.5) / len(group) - 0.5) for i in range(len(group))]
+        ordered += group
+    at, values, us = np.array(x), np.array([row.value for row in ordered]), np.array([row.u for row in ordered])
+    apart = np.array([row.run in differing for row in ordered])
+    good, why = ~apart, tuple(f"{row.run}: {differing[row.run]}" for row in ordered if row.run in differing)
+    names = tuple(row.run for row in ordered if row.run not in differing)
+    series = [Series("value ± u", at[good], values[good], u=us[good], why=names)]
+    if mean is not None:
+        ends = np.array([0.5, len(groups) + 0.5])
+        series[:0] = [
+            band_of("mean ± u", ends, np.full(2, mean.value), np.full(2, mean.u)),
+            line_of("mean", ends, np.full(2, mean.value)),
+        ]
     if apart.any():
-        series.append(Series("differs from its course", x[apart], values[apart], "flagged", u=us[apart], why=why))
-    panel = Panel(label, tuple(series), x_label="run", names=names)
-    return Chart("course", "All runs", "Point at a run to read its name.", (panel,))
+        series.append(Series("differs from its course", at[apart], values[apart], "flagged", u=us[apart], why=why))
+    panel = Panel(label, tuple(series), x_label=x_label, names=tuple(groups))
+    caption = "Point at a run to read its name, click to find it in the table."
+    return Chart("course", "All runs", caption, (panel,))
 
 
+GROUP_WIDTH = 0.6  # width of the place of a group, of the distance between two groups
 MOST_BINS, FEWEST_BINS = 60, 8
 
 

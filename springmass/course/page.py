@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from acquisition.errors import visible
 from pipeline.numerics.estimate import Estimate
 from pipeline.several.course import LITTLE
 from springmass.charts.chart import Chart
-from springmass.charts.several import course, drag_map
+from springmass.charts.several import CourseValue, course, drag_map
 from springmass.course.benches import BENCHES, CourseComparison
 from springmass.course.results_csv import COURSE, FAILED
 from springmass.result.advice import sentence
@@ -31,26 +32,34 @@ COLUMN_HEADINGS = {
     "drag_coefficient": "C_d",
 }
 """Estimates with a column, and its heading; amplitudes have the unit of their run."""
+LONGEST_PART = 16  # characters of a name that stay together: the width of its column
 LINE_LOOKS = ("failed", "error", "warning", "fine")
 _STATUS = {"ok": 0, "no_oscillation": 1}
 
 
 def write_page(
-    folder: Path, rows: Sequence[Mapping[str, Any]], lines: Sequence[Mapping[str, Any]], tags: Sequence[str]
+    folder: Path,
+    rows: Sequence[Mapping[str, Any]],
+    lines: Sequence[Mapping[str, Any]],
+    tags: Sequence[str],
+    comparison: CourseComparison | None,
 ) -> None:
     """Write ``index.html``; the link of a line is empty if its run has no report."""
     from springmass.report.html import SHARED, Figures, drawn_by_script, template
 
     there = [name for name in COLUMN_HEADINGS if any(line["cells"][name] for line in lines)]  # only with numbers
-    shown = [{**line, "link": quote(line["link"])} for line in lines]
+    shown = [{**line, "link": quote(line["link"]), "parts": _parts(line["name"])} for line in lines]
     figures = Figures()
     differing = {visible(line["name"]): line["differs"] for line in lines if line["differs"]}
-    drawn = [figures.add(chart) for chart in (_of_all(rows, differing), _of_drag(rows)) if chart is not None]
+    right = [row for row, line in zip(rows, lines, strict=True) if line["look"] not in ("failed", "error")]
+    charts = (_of_all(rows, differing, comparison), _of_drag(right))
+    drawn = [figures.add(chart) for chart in charts if chart is not None]
     page = template("course.html.j2").render(
         title=folder.resolve().name,
-        lines=sorted(shown, key=lambda line: (*(-x for x in line["need"]), line["name"])),
+        lines=sorted(shown, key=lambda line: (*(-x for x in line["need"][:3]), line["name"])),
         tags=tags,
         quantities={name: COLUMN_HEADINGS[name] for name in there},
+        agreements=() if comparison is None else comparison.agreements,
         counts={kind: sum(line["look"] == kind for line in shown) for kind in LINE_LOOKS},
         figures={figure["name"]: figure for figure in drawn},
         **drawn_by_script(figures.charts, SHARED),
@@ -58,14 +67,31 @@ def write_page(
     write_whole(folder / COURSE_PAGE, page.encode("utf-8", "backslashreplace"))
 
 
-def _of_all(rows: Sequence[Mapping[str, Any]], differing: Mapping[str, str]) -> Chart | None:
+def _parts(name: str) -> list[str]:
+    """Return a name in parts between which a line may break; parts that are too long for a column break anywhere."""
+    parts = re.split(r"(?<=[_\-/. ])", name)
+    return parts if max(map(len, parts)) <= LONGEST_PART else []
+
+
+def _of_all(
+    rows: Sequence[Mapping[str, Any]], differing: Mapping[str, str], comparison: CourseComparison | None
+) -> Chart | None:
     """Return the chart of all spring constants, or else of all periods, if at least two runs have one."""
+    by = "" if comparison is None or comparison.bench == COURSE else comparison.bench
     for name, label in (("spring_constant", "spring constant / (N/m)"), ("period", "period / s")):
         values = [
-            (visible(row["run"]), row[name], row[f"{name}_u"] or 0.0) for row in rows if row.get(name) is not None
+            CourseValue(
+                run := visible(row["run"]),
+                visible(row.get(by) or "none") if by else run,
+                row[name],
+                row[f"{name}_u"] or 0.0,
+            )
+            for row in sorted(rows, key=lambda row: (not row.get(by), row.get(by)))
+            if row.get(name) is not None
         ]
         if len(values) > 1:
-            return course(label, values, differing)
+            means = [x.mean for x in comparison.agreements if x.quantity == name] if comparison is not None else []
+            return course(label, by or "run", values, differing, means[0] if len(means) == 1 else None)
     return None
 
 

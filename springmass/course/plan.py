@@ -193,7 +193,7 @@ POSITION = "sensor_position"
 _U = tuple(f"{name}_u" for name in PLACES)
 KNOWN = ("path", "scene", POSITION, *ANSWERS, *PLACES, *_U)
 TEMPLATE_COLUMNS = (
-    "path", "bob_mass_kg", "bob_mass_kg_u", "spring_mass_kg", "spring_mass_kg_u", "disc_diameter_m",
+    "path", "scene", "bob_mass_kg", "bob_mass_kg_u", "spring_mass_kg", "spring_mass_kg_u", "disc_diameter_m",
     "disc_diameter_m_u", "air_temperature_c", "group", "section", "spring", "disc",
 )  # fmt: skip
 Values = Mapping[str, Any]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import heapq
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -40,12 +40,10 @@ def run_course(
     now = {key_of(task): made_of(task) for task in course.tasks}
     stored = store.made_of()
     todo = [task for task in course.tasks if stored.get(key_of(task)) != now[key_of(task)]]
-    if todo:
-        from springmass.report.write import remove_report
-
-        for page in (folder / REPORTS).glob("*.results/report.html"):
-            remove_report(page.parent)  # it may show a run that has changed; an interrupted pass leaves none of these
+    names = dict(zip(now, names_of(course.tasks), strict=True))
     done = now.keys() - set(map(key_of, todo))
+    if todo:  # an interrupted pass leaves no report of a run that has changed, and the next none but those of the worst
+        _remove_reports(folder, keep={_report_of(names[key], key) for key in done})
     made, written = 0, len(done)
     with counting("runs", len(todo), lines=True) as show:
         for rows in _analysed(todo, jobs, dask, remedy):
@@ -62,7 +60,16 @@ def run_course(
             show(made)
     table = _table(course, store, done)
     write_rows(folder, table, course.tags)
-    return table, made, _write_pages(course, folder, table, reports, jobs, remedy)
+    return table, made, _write_pages(course, folder, table, reports, jobs, remedy, anew=bool(todo))
+
+
+def _remove_reports(folder: Path, keep: Collection[str]) -> None:
+    """Remove all reports but those, given by their paths in the folder."""
+    from springmass.report.write import remove_report
+
+    for page in (folder / REPORTS).glob("*.results/report.html"):
+        if page.relative_to(folder).as_posix() not in keep:
+            remove_report(page.parent)
 
 
 def _table(course: Plan, store: Store, done: set[str]) -> list[CourseRow]:
@@ -92,19 +99,32 @@ def _analysed(
 
 
 def _write_pages(
-    course: Plan, folder: Path, table: Sequence[CourseRow], reports: int, jobs: int | None, remedy: Remedy
+    course: Plan,
+    folder: Path,
+    table: Sequence[CourseRow],
+    reports: int,
+    jobs: int | None,
+    remedy: Remedy,
+    *,
+    anew: bool,
 ) -> list[str]:
-    """Write what to tell the groups, missing reports of the worst runs, and the page; return what cannot be written."""
+    """Write what to tell the groups, missing reports of the worst runs, and the page; return what cannot be written.
+
+    If rows were made ``anew``, reports of runs that are no longer among the worst are removed.
+    """
     write_whole(folder / SHARED, report_script())
     lines = [line_of(row, course.tags) for row in table]
-    if sum(row["status"] == "ok" for row in table) > 1:
-        mark(lines, compare_rows(table))
+    comparison = compare_rows(table) if sum(row["status"] == "ok" for row in table) > 1 else None
+    if comparison is not None:
+        mark(lines, comparison)
     write_groups(folder, lines, course.tags)
     for line, task in zip(lines, course.tasks, strict=True):
-        line["link"] = _report_of(line, task)
+        line["link"] = _report_of(line["name"], key_of(task))
     drawn = [(line, task) for line, task in zip(lines, course.tasks, strict=True) if line["need"][0] < 2]
     worst = heapq.nlargest(reports, drawn, key=lambda pair: (pair[0]["need"], pair[0]["name"]))
     named = [(line["name"], task, folder / line["link"]) for line, task in worst]
+    if anew:
+        _remove_reports(folder, keep={line["link"] for line, _ in worst})
     todo = [(name, task, page.parent) for name, task, page in named if not page.exists()]
     unwritten: list[str] = []
     finished = 0
@@ -116,11 +136,11 @@ def _write_pages(
             show(finished)
     for line in lines:
         line["link"] = line["link"] if (folder / line["link"]).exists() else ""
-    write_page(folder, table, lines, course.tags)
+    write_page(folder, table, lines, course.tags, comparison)
     return sorted(unwritten)
 
 
-def _report_of(line: Mapping[str, Any], task: Task) -> str:
+def _report_of(name: str, key: str) -> str:
     """Return the path of a run's report in the folder; names are numbered anew if a run is removed, keys are not."""
-    safe = safe_name(line["name"], longest=100)
-    return f"{REPORTS}/{safe}-{hashlib.sha256(key_of(task).encode()).hexdigest()[:8]}.results/report.html"
+    safe = safe_name(name, longest=100)
+    return f"{REPORTS}/{safe}-{hashlib.sha256(key.encode()).hexdigest()[:8]}.results/report.html"

@@ -13,16 +13,16 @@ from springmass.result.output_names import safe_name
 from storage.recovery.recover import run_paths
 
 
-def default_name(what: str, now: datetime) -> Path:
-    """Return a name with time and subject, and with a number if the name is taken.
+def default_name(what: str, now: datetime, folder: Path = Path()) -> Path:
+    """Return a name in a folder with time and subject, and with a number if the name is taken.
 
     >>> str(default_name("undamped", datetime(2026, 11, 22, 14, 5)))
     '2026-11-22_1405_undamped.h5'
     """
     stem = f"{now:%Y-%m-%d_%H%M}_{safe_name(what, '-') or 'run'}"
-    taken = {path.name.removeprefix(stem).split(".")[0] for path in Path().glob(f"{stem}*")}
+    taken = {path.name.removeprefix(stem).split(".")[0] for path in folder.glob(f"{stem}*")}
     number = next(text for text in itertools.chain([""], (f"-{n}" for n in itertools.count(2))) if text not in taken)
-    return Path(f"{stem}{number}.h5")
+    return folder / f"{stem}{number}.h5"
 
 
 def demand_new(path: Path, sensors: int) -> None:

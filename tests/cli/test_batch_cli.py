@@ -16,7 +16,7 @@ import pytest
 
 import springmass
 from springmass.layout import PACKAGES
-from tests.courses import bad_files, contents, short_course
+from tests.courses import bad_files, contents, damped, short_course, write_recording
 from tests.sampling import sampled
 
 ROOT = Path(__file__).parents[2]
@@ -289,3 +289,16 @@ def test_a_report_stays_that_of_its_recording(runs, cli):
     assert "1 unchanged, 0 analysed" in cli(*command).err
     (link,) = re.findall(r'href="(reports/[^"]*)"', Path("out/index.html").read_text())
     assert json.loads((Path("out") / link).with_name("results.json").read_text())["input"]["path"] == "runs/run000.txt"
+
+
+def test_only_the_report_of_a_changed_run_is_written_again(runs, cli):
+    """A course that is continued leaves the other reports as they are."""
+    call = ["batch", runs, "-o", "out", "--jobs", "1"]
+    assert cli(*call).code == 0
+    before = {page: page.stat().st_mtime_ns for page in Path("out").glob("reports/*/report.html")}
+    assert len(before) == 6
+    write_recording(Path(runs) / "run001.txt", damped(9, omega=8.05))
+    assert cli(*call).code == 0
+    assert {page.parent.name[:6] for page, written in before.items() if page.stat().st_mtime_ns != written} == {
+        "run001"
+    }

@@ -142,9 +142,9 @@ class Panel {
     const x = { ...axis(panel.x_label, panel.log_x), size: 30 * k, space: 60 * k };
     if (more.bare) Object.assign(x, { label: null, labelSize: 0, size: 8 * k, values: (_, splits) => splits.map(() => "") });
     if (panel.names && panel.names.length) {
-      const count = panel.names.length, room = this.size().width / k - 90, short = panel.names.every((name) => name.length * count * 8 < room);
-      const every = Math.ceil((40 * count) / room), shown = panel.names.map((_, i) => i + 1).filter((v) => (v - 1) % every === 0);
-      Object.assign(x, { splits: () => shown, values: (_, at) => at.map((v) => (short ? panel.names[v - 1] : String(v))) });
+      const count = panel.names.length, room = this.size().width / k - 90, longest = Math.max(...panel.names.map((name) => name.length));
+      const every = Math.ceil(((8 * longest + 10) * count) / room), shown = panel.names.map((_, i) => i + 1).filter((v) => (v - 1) % every === 0);
+      Object.assign(x, { splits: () => shown, values: (_, at) => at.map((v) => panel.names[v - 1]) });
     }
     const log = this.log && { distr: 3 };
     this.plot = new uPlot({
@@ -188,6 +188,19 @@ class Panel {
     ctx.restore();
   }
 
+  // The text of the point at a place on the screen; of those beyond the axis, which stand at its edge, too.
+  pointAt(clientX, clientY) {
+    const place = this.plot.over.getBoundingClientRect(), best = { far: 12, text: "" };
+    for (const s of this.visible()) {
+      for (let i = 0; s.why && s.y && i < s.x.length; i++) {
+        const to = Math.min(Math.max(this.plot.valToPos(s.y[i], "y"), 0), place.height);
+        const far = Math.hypot(this.plot.valToPos(s.x[i], "x") - clientX + place.left, to - clientY + place.top);
+        if (far < best.far) Object.assign(best, { far, text: s.why[i] });
+      }
+    }
+    return best.text;
+  }
+
   // What stands under the cursor, in words; an empty text beside the axes.
   read() {
     const { left, top } = this.plot.cursor;
@@ -201,7 +214,7 @@ class Panel {
       if (s.role === "flagged" || s.role === "mark") { if (!far && s.why && s.why[i]) out.push(s.role === "mark" ? s.why[i] : `left out: ${s.why[i]}`); continue; }
       if (i < 0 || !known(s.y[i]) || said.has(s.label) || s.role === "band" || texts.length > 3 || (far && !s.line)) continue;
       said.add(s.label);
-      texts.push(`${this.panel.names ? this.panel.names[Math.round(s.x[i]) - 1] : s.label} ${written(s.y[i])}${s.u && s.u[i] ? ` ± ${written(s.u[i], 2)}` : ""} ${bare(own)}`.trim());
+      texts.push(`${s.why ? s.why[i] : this.panel.names ? this.panel.names[Math.round(s.x[i]) - 1] : s.label} ${written(s.y[i])}${s.u && s.u[i] ? ` ± ${written(s.u[i], 2)}` : ""} ${bare(own)}`.trim());
     }
     const where = this.panel.names ? "" : `${name} ${written(x)} ${bare(unit)}: `;
     return where + [...texts, ...out].join("; ");
@@ -322,6 +335,21 @@ function makeButton(words, act, name) {
   button.addEventListener("click", () => act(button));
   return button;
 }
+// Copy a text to the clipboard, even from a page that was opened from the disk.
+async function copyText(text) {
+  if (navigator.clipboard && isSecureContext) {
+    try { await navigator.clipboard.writeText(text); return true; } catch { /* not allowed: use execCommand below */ }
+  }
+  const area = document.createElement("textarea");
+  area.value = text;
+  area.style.cssText = "position: fixed; opacity: 0;";
+  document.body.append(area);
+  area.select();
+  const done = document.execCommand("copy");
+  area.remove();
+  return done;
+}
+
 function makeBox(name, parent) {
   const box = document.createElement("div");
   box.className = name;
@@ -445,6 +473,10 @@ class Chart {
     });
     for (const end of ["pointerup", "pointerleave"]) box.addEventListener(end, () => { from = null; });
     box.addEventListener("dblclick", () => this.act("all"));
+    box.addEventListener("click", (event) => {
+      const detail = panel.pointAt(event.clientX, event.clientY);
+      if (detail) box.dispatchEvent(new CustomEvent("point", { bubbles: true, detail }));
+    });
     box.addEventListener("pointerleave", () => { this.value.textContent = this.hint; });
   }
 

@@ -12,21 +12,6 @@ function whenSeen(figure, make) {
   attempt();
 }
 
-// Copy a text to the clipboard, even from a page that was opened from the disk.
-async function copyText(text) {
-  if (navigator.clipboard && isSecureContext) {
-    try { await navigator.clipboard.writeText(text); return true; } catch { /* not allowed: use execCommand below */ }
-  }
-  const area = document.createElement("textarea");
-  area.value = text;
-  area.style.cssText = "position: fixed; opacity: 0;";
-  document.body.append(area);
-  area.select();
-  const done = document.execCommand("copy");
-  area.remove();
-  return done;
-}
-
 // For print every chart is drawn on a canvas of four times the pixels; of many charts, with fewer.
 async function toPaper(figures, charts) {
   const times = Math.max(1, Math.min(4, Math.floor(64 / figures.length)));

@@ -8,7 +8,7 @@ function element(name, content = "", more = {}) {
   Object.assign(made.dataset, dataset || {});
   return made;
 }
-const row = (cells, of = "td") => element("tr", cells.map((cell) => (cell instanceof Node ? cell : element(of, cell))));
+const row = (cells, of = "td") => element("tr", cells.map((cell) => (["TD", "TH"].includes(cell.tagName) ? cell : element(of, cell))));
 function choices(select, items, value) {
   select.replaceChildren(...items.map(({ value: each, label }) => element("option", label, { value: each })));
   select.value = value;
@@ -44,9 +44,17 @@ function term(words, text) {
   return [`${words} `, button];
 }
 
+function draw_chart(figure, chart) {
+  const box = element("div", "", { className: "chart", id: new_id() });
+  figure.replaceChildren(box, ...(chart.caption ? [element("figcaption", [element("b", `${chart.title}. `), chart.caption])] : []));
+  return new Chart(box, decoded(structuredClone(chart)));
+}
+
+// What may be stated about any file; a question of its reader has the choices of the file.
+const READING = () => [["channel", "Column of values", []], ["unit", "Unit", KNOWN.units], ["time", "Column of times", []], ["time_unit", "Unit of the times", KNOWN.times], ["rate_hz", "Rate in samples per second", []]].map(([name, label, of]) => ({ name, label, choices: of }));
 const STAGES = { waiting: "Waiting ...", reading: "Reading ...", analysing: "Analysing ...", done: "", question: "Needs an answer", failed: "Not read" };
 
-class Card {
+class RecordingCard {
   constructor(id) {
     this.id = id;
     this.box = document.getElementById("card").content.firstElementChild.cloneNode(true);
@@ -58,6 +66,7 @@ class Card {
     this.again = makeButton("Try again", () => this.change({}));
     this.at(".card-buttons").append(this.stop, this.again, makeButton("Remove", () => act("remove", { card: id })));
     this.fields = new Map();
+    this.make_away();
   }
 
   at(selector) { return this.box.querySelector(selector); }
@@ -82,6 +91,7 @@ class Card {
     if (form && ready) this.show_bench(form);
     for (const part of [".bench", ".how"]) this.at(part).hidden = !(form && ready);
     if (ready) this.show_how(message);
+    if (document.activeElement !== this.at("textarea")) this.at("textarea").value = message.notes;
     for (const part of [".left", ".right"]) this.at(part).hidden = !opened || stage === "question" || stage === "failed";
     if (stage === "done" && message.version !== this.shown.version) this.load(message.version);
     if (stage === "question" || stage === "failed") this.clear();
@@ -93,7 +103,7 @@ class Card {
   }
 
   clear() {
-    for (const part of [".values", ".words", ".findings-of", ".more"]) this.at(part).hidden = true;
+    for (const part of [".values", ".words", ".findings-of", ".more", ".reported", ".away"]) this.at(part).hidden = true;
     this.at(".shown").replaceChildren();
     this.at(".outline").hidden = false;
     this.shown = { charts: new Map(), version: 0 };
@@ -102,39 +112,45 @@ class Card {
   show_opened(opened) {
     this.at(".facts").replaceChildren(...(opened.simulated ? [element("span", "simulated, not measured", { className: "kind" }), " "] : []), [opened.format, ...opened.facts].join(" · "), opened.recorded ? ` · ${opened.recorded}` : "");
     const fold = this.at(".assumed");
-    fold.hidden = !opened.assumed.length;
-    fold.querySelector("summary").textContent = `What was assumed and noticed while reading (${opened.assumed.length})`;
+    fold.querySelector("summary").textContent = `How it was read${opened.assumed.length ? `: ${opened.assumed.length} remarks` : ""}`;
     fold.querySelector("ul").replaceChildren(...opened.assumed.map((text) => element("li", text)));
     this.draw(this.at(".outline"), { ...opened.outline, caption: "" });
   }
 
-  // A question stays as fields, also once it is answered, so that an answer can be changed.
-  show_question({ stage, question, asked, answers }) {
-    const form = this.at(".question");
-    form.hidden = !(asked && asked.length) || (stage === "failed" && !Object.keys(answers).length);
-    if (form.hidden) return;
-    const open = stage === "question" ? question : null;
-    form.classList.toggle("answered", !open);
-    form.querySelector("h3").textContent = open ? "This file leaves something open" : "Your answers";
-    form.querySelector(".reason").textContent = open ? open.reason : "";
-    form.querySelector(".rows").hidden = !(open && open.rows.length);
-    if (open && open.rows.length) {
+  // What a file leaves open is asked in the open; whatever else may be stated about it waits in a fold.
+  show_question({ stage, question, asked, answers, opened, form: bench }) {
+    const form = this.at(".question"), fold = this.at(".assumed"), open = stage === "question" ? question : null;
+    const ours = opened && !opened.foreign, fields = new Map(READING().map((field) => [field.name, field]));
+    for (const field of asked || []) fields.set(field.name, field);
+    const now = new Set(open ? open.fields.map(({ name }) => name) : []);
+    form.hidden = !open;
+    fold.hidden = !open && stage !== "failed" && !bench;
+    fold.querySelector("form").hidden = Boolean(ours);
+    if (!opened) fold.querySelector("summary").textContent = "State how it is read";
+    if (open) {
+      form.querySelector(".reason").textContent = open.reason;
+      form.querySelector(".rows").hidden = !open.rows.length;
       const [head, ...rows] = open.rows;
-      form.querySelector("table").replaceChildren(element("thead", row(head.map((cell) => element("th", cell, { scope: "col" })))), element("tbody", rows.map((cells) => row(cells))));
+      if (head) form.querySelector("table").replaceChildren(element("thead", row(head.map((cell) => element("th", cell, { scope: "col" })))), element("tbody", rows.map((cells) => row(cells))));
     }
-    const place = form.querySelector(".fields");
-    for (const field of asked) {
-      const known = this.fields.get(field.name), same = known && JSON.stringify(known.field) === JSON.stringify(field);
-      if (same) { if (document.activeElement !== known.input) known.input.value = answers[field.name] || ""; continue; }
-      const input = field.choices.length ? choices(element("select"), [{ value: "", label: "choose ..." }, ...field.choices.map((each) => ({ value: each, label: each === "1" ? "1 (a plain number)" : each }))], answers[field.name] || "") : element("input", "", { inputMode: "decimal", value: answers[field.name] || "", autocomplete: "off" });
-      input.id = new_id();
-      input.addEventListener("change", () => this.answer(field.name, input.value));
-      const words = field.name === "rate_hz" ? "Rate in samples per second" : field.label;
-      const label = element("div", [element("label", words, { htmlFor: input.id }), input], { className: "field" });
-      if (field.name === "run" && field.choices.length > 1) label.append(makeButton("A card for each run", () => act("separate", { card: this.id })));
-      if (known) known.label.replaceWith(label); else place.append(label);
-      this.fields.set(field.name, { field, input, label });
+    for (const field of fields.values()) {
+      const known = this.fields.get(field.name), label = known && JSON.stringify(known.field) === JSON.stringify(field) ? known.label : this.make_field(field, answers[field.name] || "");
+      if (known && known.label !== label) known.label.remove();
+      const { input } = this.fields.get(field.name), place = now.has(field.name) || (field.name in answers && open) ? form.querySelector(".fields") : fold.querySelector("form");
+      if (document.activeElement !== input) input.value = answers[field.name] || "";
+      if (label.parentElement !== place) { const had = document.activeElement === input; place.append(label); if (had) input.focus(); }
     }
+  }
+
+  make_field(field, value) {
+    const options = [{ value: "", label: "choose ..." }, ...field.choices.map((each) => ({ value: each, label: each === "1" ? "1 (a plain number)" : each }))];
+    const input = field.choices.length ? choices(element("select"), options, value) : element("input", "", { value, autocomplete: "off", size: 12 });
+    input.id = new_id();
+    input.addEventListener("change", () => this.answer(field.name, input.value));
+    const label = element("div", [element("label", field.label, { htmlFor: input.id }), input], { className: "field" });
+    if (field.name === "run" && field.choices.length > 1) label.append(makeButton("A card for each run", () => act("separate", { card: this.id })));
+    this.fields.set(field.name, { field, input, label });
+    return label;
   }
 
   answer(name, value) {
@@ -185,10 +201,38 @@ class Card {
   }
 
   async send_bench() {
-    const pending = this.pending;
-    const bench = { ...this.message.bench, ...pending };
-    await this.change({ bench });
+    const { pending } = this;
+    await this.change({ bench: { ...this.message.bench, ...pending } });
     if (this.pending === pending) this.pending = {};
+  }
+
+  // What a person takes away is made first, then loaded; a report opens in a tab of its own.
+  make_away() {
+    const ways = [["Open report", "report", "report"], ["Table as CSV", "report", "results.csv"], ["Table for LaTeX", "report", "table.tex"], ["Figures as PNG and SVG", "figures", "figures.zip"], ["Save run file", "run", "run.h5"]];
+    const place = this.at(".away .card-buttons"), notes = this.at(".away textarea"), table = this.at("table.results");
+    place.append(...ways.map(([words, what, file]) => makeButton(words, async (button) => {
+      const address = `/window/cards/${this.id}/${file}`, tab = file === "report" ? open("about:blank") : null;
+      button.disabled = true;
+      const made = await act("write", { card: this.id, what });
+      button.disabled = false;
+      if (!made) tab?.close();
+      else if (tab) tab.location = address;
+      else element("a", "", { href: address, download: "" }).click();
+    })), makeButton("Copy for a spreadsheet", async (button) => {
+      const done = await copyText(["quantity\tvalue\tu\tunit", ...[...table.querySelectorAll("tbody tr")].map((line) => `${line.dataset.quantity}\t${line.dataset.cells.replaceAll("|", "\t")}`)].join("\n"));
+      button.textContent = done ? "Copied" : "Not allowed by the browser";
+      setTimeout(() => { button.textContent = "Copy for a spreadsheet"; }, 1500);
+    }));
+    notes.addEventListener("change", () => this.change({ notes: notes.value }));
+    const values = [["Period T", "period", ["s", "ms"]], ["Spring constant k", "spring_constant", ["N/m"]], ["Damping rate γ", "damping_rate", ["1/s"]]].map(([words, name, units]) => {
+      const inputs = [words, `u of ${words}`].map((label) => element("input", "", { inputMode: "decimal", autocomplete: "off", ariaLabel: label }));
+      const unit = choices(element("select", "", { ariaLabel: `Unit of ${words}` }), units.map((value) => ({ value, label: value })), units[0]);
+      return { name, box: element("div", [element("label", words), inputs[0], "±", inputs[1], unit], { className: "cell" }), row: () => [name, inputs[0].value.replace(",", "."), inputs[1].value.replace(",", "."), unit.value] };
+    });
+    this.at(".reported .fields").append(...values.map(({ box }) => box), makeButton("Judge my values", async () => {
+      const found = await act("judge", { card: this.id, rows: values.map(({ row }) => row()).filter(([, value]) => value.trim()) });
+      if (found) this.at(".reported [role='status']").replaceChildren(...found.judged.map(({ name, printed, ours, verdict }) => element("p", [element("b", `${name.replaceAll("_", " ")} ${printed}: ${verdict}. `), `This recording gives ${ours}.`])), ...found.findings.map((text) => element("p", text)));
+    }));
   }
 
   show_how({ from_s, to_s, law, accuracy, opened }) {
@@ -196,7 +240,7 @@ class Card {
     if (!this.how) {
       this.how = {
         from_s: element("input", "", { inputMode: "decimal", size: 7 }), to_s: element("input", "", { inputMode: "decimal", size: 7 }),
-        law: choices(element("select"), [{ value: "", label: "the one that fits best" }, ...LAWS], ""),
+        law: choices(element("select"), [{ value: "", label: "the one that fits best" }, ...KNOWN.laws], ""),
         accuracy: choices(element("select"), [{ value: "fast", label: "fast" }, { value: "standard", label: "standard" }, { value: "best", label: "best, slower" }], "standard"),
       };
       const words = { from_s: "From (s)", to_s: "To (s)", law: "Law of damping", accuracy: "Accuracy" };
@@ -229,6 +273,7 @@ class Card {
     words.hidden = false;
     words.replaceChildren(...found.summary.map(([title, text]) => element("p", [element("b", `${title}. `), text])));
     this.show_findings(found.findings);
+    this.at(".reported").hidden = this.at(".away").hidden = false;
     const at_once = found.charts.filter(({ name }) => ["position", "amplitude", "spectrum"].includes(name)), others = found.charts.filter((chart) => !at_once.includes(chart));
     this.draw_all(this.at(".shown"), at_once);
     const fold = this.at(".more"), place = fold.querySelector(".figures");
@@ -246,14 +291,14 @@ class Card {
   show_values({ rows, graded }) {
     const table = this.at("table.results"), quoted = rows.some(({ grade }) => grade);
     this.at(".values").hidden = false;
-    const heads = ["quantity", "", term("value ± u", TERMS.u), ...(quoted ? [term("quote it?", TERMS.grade)] : [])];
+    const heads = ["quantity", "symbol", term("value ± u", TERMS.u), ...(quoted ? [term("quote it?", TERMS.grade)] : [])];
     const lines = rows.map(({ name, quantity, symbol, value, note, grade, why, cells }) => {
       const [letter, index] = symbol.split(" ");
       const sign = element("td", [element("i", letter), ...(index ? [element("sub", index)] : [])]);
       const shown = note ? element("td", note, { className: "needs" }) : element("td", value, { className: "num" });
       const line = row([element("th", term(quantity, TERMS[name]), { scope: "row" }), sign, shown, ...(quoted ? [element("td", grade, { className: `grade ${grade.replaceAll(" ", "-")}`, title: why })] : [])]);
       line.dataset.name = name;
-      line.dataset.cells = cells;
+      Object.assign(line.dataset, { cells, quantity });
       return line;
     });
     table.replaceChildren(element("thead", row(heads.map((head) => element("th", head, { scope: "col" })))), element("tbody", lines));
@@ -270,9 +315,7 @@ class Card {
     const text = JSON.stringify(chart), key = chart.name;
     if (this.shown.charts.get(key) === text) return;
     this.shown.charts.set(key, text);
-    const box = element("div", "", { className: "chart", id: new_id() });
-    figure.replaceChildren(box, ...(chart.caption ? [element("figcaption", [element("b", `${chart.title}. `), chart.caption])] : []));
-    const made = new Chart(box, decoded(JSON.parse(text)));
+    const made = draw_chart(figure, chart);
     if (key === "position") made.bar.append(makeButton("Analyse only what is shown", () => {
       const [from, to] = made.range(made.chart.panels[0].x_label);
       this.change({ from_s: Number(from.toFixed(4)), to_s: Number(to.toFixed(4)) });

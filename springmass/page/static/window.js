@@ -3,23 +3,23 @@
 // open. Every request that changes something has a header that no other page can send.
 const $ = (id) => document.getElementById(id);
 const cards = new Map();
-let socket = null, wait_ms = 250, LAWS = [];
+let socket = null, wait_ms = 250, KNOWN = {};
 
 function complain(text) { $("message").textContent = text; $("message").hidden = !text; if (text) $("message").scrollIntoView({ block: "nearest" }); }
 
-async function post(address, body) {
+async function post(address, body, say = (text) => complain(`Not done: ${text}`)) {
   try {
     const answered = await fetch(address, { method: "POST", body, headers: { "X-Springmass": "window" } }), found = await answered.json();
     if (answered.ok) return found;
-    complain(`Not done: ${found.refused}.`);
+    say(`${found.refused.replace(/\.$/, "")}.`);
   } catch {
     complain("The program behind this window has ended. Open springmass again: your recordings are offered there for a day.");
   }
   return null;
 }
-function act(what, more = {}) {
+function act(what, more = {}, say = undefined) {
   complain("");
-  return post("/window/do", JSON.stringify({ do: what, ...more }));
+  return post("/window/do", JSON.stringify({ do: what, ...more }), say);
 }
 
 // Entries of what was dropped: files, each with the folder that it lies in.
@@ -73,16 +73,18 @@ function connect() {
 }
 
 function receive(message) {
-  if (message.type === "card") { cards.get(message.id)?.show(message); return; }
-  LAWS = message.laws;
+  if (message.type === "card") { cards.get(message.id)?.show(message); show_together(); return; }
+  if (message.type === "recorder") { show_recorder(message); return; }
+  KNOWN = message;
   for (const id of message.order) if (!cards.has(id)) {
-    const card = new Card(id);
+    const card = new RecordingCard(id);
     card.box.dataset.card = id;
     cards.set(id, card);
     $("cards").prepend(card.box);
   }
   for (const [id, card] of cards) if (!message.order.includes(id)) { card.box.remove(); cards.delete(id); }
   document.body.classList.toggle("empty", !message.order.length);
+  show_together();
   $("earlier").replaceChildren(...message.earlier.map(({ id, names }) => element("p", [
     `An earlier window left ${names.length === 1 ? "a recording" : `${names.length} recordings`}: ${names.slice(0, 4).join(", ")}${names.length > 4 ? " ..." : ""} `,
     makeButton("Open again", () => act("restore", { window: id })), " ", makeButton("Forget", () => act("forget", { window: id })),
@@ -93,4 +95,4 @@ addEventListener("beforeunload", (event) => {
   if ([...cards.values()].some(({ message }) => message && !message.saved && (Object.keys(message.answers).length || Object.keys(message.bench).length || message.notes))) event.preventDefault();
 });
 setInterval(() => { for (const card of cards.values()) if (card.message) card.tick(); }, 1000);
-connect();
+addEventListener("load", connect);

@@ -20,6 +20,7 @@ from springmass.loading.load import sample_data
 from springmass.page.web.security import ACT, Access
 from springmass.page.web.server import PAGE_FILES, server_of, static_files
 from springmass.page.window.cards import Cards, NotTaken
+from springmass.page.window.recording import ports
 
 DESERTED_S, FIRST_S = 60.0, 600.0
 """Time after which the server ends when the last page is gone, and when none ever came."""
@@ -58,6 +59,12 @@ class Window:
                 return JSONResponse(await cards.judge(card, asked["rows"]))
             case "compare":
                 return FileResponse(await cards.compare(asked), media_type="application/json")
+            case "ports":
+                return JSONResponse(await ports())
+            case "record":
+                cards.record(asked)
+            case "end":
+                cards.recorder.end()
             case "restore" | "forget":
                 cards.restore(str(asked["window"]), forget=asked["do"] == "forget")
             case _:
@@ -87,13 +94,13 @@ class Window:
                 await browser.send_text(json.dumps(message))
             await turned
 
-    async def reading(self, over: Callable[[], None], busy: Callable[[], bool]) -> None:
+    async def reading(self, over: Callable[[], None]) -> None:
         """Call ``over`` once no page has been there for a while and nothing is recorded."""
         self._cards.children.prepare()
         while True:
             await asyncio.sleep(1.0)
-            self._cards.touch()
-            self.quiet_s = 0.0 if self.pages or busy() else self.quiet_s + 1.0
+            busy = self._cards.look()
+            self.quiet_s = 0.0 if self.pages or busy else self.quiet_s + 1.0
             if self.quiet_s >= DESERTED_S:
                 over()
 
@@ -182,7 +189,7 @@ def serve_window(cards: Cards, begin: Callable[[], None], *, port: int, opened: 
         async def life(_: Starlette) -> AsyncIterator[None]:
             begin()
             opened(f"http://127.0.0.1:{port}/?token={access.token}", "")
-            ticking = asyncio.create_task(window.reading(lambda: setattr(server, "should_exit", True), lambda: False))
+            ticking = asyncio.create_task(window.reading(lambda: setattr(server, "should_exit", True)))
             try:
                 yield
             finally:

@@ -20,6 +20,11 @@ FIELDS: Mapping[str, tuple[str, str, str]] = {
     "air.pressure_pa": ("Air pressure", "hPa", "Where you are, not reduced to sea level. Empty means 1013 hPa."),
     "air.relative_humidity": ("Humidity of the air", "%", "It changes the speed of sound a little. Empty means 50 %."),
     "pendulum.length_m": ("Length of a pendulum", "cm", "From the pivot to the middle of the bob. It gives g."),
+    "sensor.clock_ppm": (
+        "Error of the clock",
+        "ppm",
+        "How much the clock of the sensor is wrong; 0 ± 20 if it may be 20 ppm.",
+    ),
 }
 """Label, first unit and explanation of every quantity of the form, by table and key of a scene."""
 SENSOR_PLACE = "sensor.position"

@@ -14,6 +14,7 @@ from springmass.charts.run import charts_of, recording
 from springmass.comparing.comparison import SpringComparison, line_and_hooke_words
 from springmass.comparing.reported import Reported
 from springmass.loading.loaded import Loaded
+from springmass.page.window.bench import FIELDS
 from springmass.report.html import tables_of
 from springmass.report.recorded import bench_words, date_words, notes_of
 from springmass.report.words import method, summary
@@ -25,7 +26,7 @@ LABELS = {
     Missing.RUN: "Run",
     Missing.CHANNEL: "Column of values",
     Missing.TIME: "Column of times",
-    Missing.RATE_HZ: "Rate",
+    Missing.RATE_HZ: "Rate in samples per second",
     Missing.TIME_UNIT: "Unit of the times",
     Missing.UNIT: "Unit",
 }
@@ -33,26 +34,33 @@ FIELD_OF = {
     "unit": "Unit",
     "time-unit": "Unit of the times",
     "time": "Column of times",
-    "rate-hz": "Rate",
+    "rate-hz": "Rate in samples per second",
     "from": "From",
     "to": "To",
-    "law": "Law",
+    "law": "Law of damping",
     "mass-kg": "Mass of the bob",
-    "set": "Mass of the spring",
     "clock-ppm": "Error of the clock",
-}
-"""The field of the window that stands for an option of the command line."""
+} | {place: label for place, (label, *_) in FIELDS.items()}
+"""The field of the window that stands for an option of the command line, or for a key of a scene."""
+_TYPED_WORDS = re.compile(
+    r"--set (?P<key>\w+\.\w+)=\S+(?<!\.)|--(?P<option>[a-z]+(?:-[a-z]+)*)(?: KG| any)?|\[(?P<table>\w+)\] (?P<name>\w+)"
+)
 OWN_FORMATS = {"run": "run file of springmass", "wire": "log of a recording"}
 
 
 def in_fields(text: str) -> str:
-    """Return an advice with the fields of the window in place of the options of a command line.
+    """Return an advice with the fields of the window in place of options of a command line and keys of a scene.
 
-    >>> in_fields("For the spring constant, state the mass: --mass-kg KG.")
-    'For the spring constant, state the mass: the field "Mass of the bob".'
+    >>> in_fields("State the mass: --mass-kg KG."), in_fields("No u: [bob] mass_kg. See --from 1.5 --to 2.")
+    ('State the mass: “Mass of the bob”.', 'No u: “Mass of the bob”. See “From” 1.5 “To” 2.')
     """
-    words = r"--([a-z]+(?:-[a-z]+)*)( KG| any| spring\.\S+(?<!\.)| \d\S*(?<!\.))?"
-    return re.sub(words, lambda found: f'the field "{FIELD_OF.get(found[1], found[1])}"', text)
+
+    def field(found: re.Match[str]) -> str:
+        name = found["key"] or found["option"] or f"{found['table']}.{found['name']}"
+        return f"“{FIELD_OF.get(name, name)}”"
+
+    text = text.replace(" as in --mass-kg 0.2007+/-0.0001, or as u in the scene", " in the field after ±")
+    return _TYPED_WORDS.sub(field, text.replace(" of analyse", ""))
 
 
 def opened(loaded: Loaded) -> dict[str, Any]:
@@ -61,6 +69,7 @@ def opened(loaded: Loaded) -> dict[str, Any]:
     times = track.t[track.t == track.t]
     return {
         "format": OWN_FORMATS.get(loaded.format) or get_format(loaded.format).title,
+        "foreign": loaded.format not in OWN_FORMATS,
         "facts": [
             *filter(None, [visible(loaded.title), loaded.channel and f"values from “{visible(loaded.channel)}”"]),
             f"{len(track)} samples",
@@ -123,7 +132,8 @@ def results_of(run: Run) -> dict[str, Any]:
         "estimates": run.result["estimates"],
         "summary": [[title, in_fields(text)] for title, text in summary(analysis)],
         "findings": [
-            {**notice, "advice": in_fields(notice["advice"])} for notice in [*notices["warnings"], *notices["notes"]]
+            {**notice, **{part: in_fields(notice[part]) for part in ("message", "advice", "details")}}
+            for notice in [*notices["warnings"], *notices["notes"]]
         ],
         "method": [in_fields(text) for text in method(analysis)],
         "bench": bench_words(analysis.scene).partition(";")[0],

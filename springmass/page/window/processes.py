@@ -118,9 +118,8 @@ class Children:
             begun()
             child = self._idle.pop(holder, None)
             if child is None:
-                self.prepare()
-                assert self._spare is not None
-                child, self._spare = await self._spare, None
+                spare, self._spare = self._spare, None  # before the wait: the next card needs a process of its own
+                child = await (spare or Child.start())
             self._busy[holder] = child
             try:
                 async for answer in child.ask(request, LONGEST_S + LONGEST_S_PER_MB * size * 1e-6):

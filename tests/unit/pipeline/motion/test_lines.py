@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
 import pytest
 
 from pipeline.analyse import analyse
@@ -68,3 +71,31 @@ def test_nothing_asks_for_a_spring_where_there_is_none() -> None:
     for wrong in ({"none": "perhaps"}, {"none": True, "mass_kg": 0.01}):
         with pytest.raises(SceneError):
             Scene.from_mapping({"spring": wrong})
+
+
+@pytest.mark.parametrize(("mean_s", "jitter"), [(0.45, 0.3), (0.55, 1.0), (1.2, 0.4)])
+def test_uneven_times_show_a_line_beyond_half_of_their_rate(mean_s: float, jitter: float) -> None:
+    """Times without aliases give the period from less than two readings a period; nearly even ones are too slow."""
+    rng = np.random.default_rng(3)
+    for uneven in (True, False):
+        t = np.cumsum(mean_s * (1.0 + (jitter if uneven else 0.01) * rng.uniform(-1.0, 1.0, 240)))
+        y = 0.26 + 0.05 * np.cos(math.tau * t / 0.79) + 5e-4 * rng.standard_normal(t.size)
+        analysis = analyse(Track.from_arrays(t, y))
+        codes = {finding.code for finding in analysis.findings}
+        if uneven:
+            period = analysis.estimates["period"]
+            assert abs(period.value - 0.79) < 4.0 * period.u < 1e-3
+            assert "undersampled" not in codes
+        else:
+            assert codes & {"undersampled", "no_oscillation"}
+
+
+def test_a_shaken_structure_has_a_period_and_no_damping_rate() -> None:
+    """Its amplitude and phase wander at random: u of the period is that of the walk of the phase."""
+    for seed in range(3):
+        record = kinds.trouble("ambient", seed)
+        said = record.said()
+        assert said.warnings == {"random_excitation"}
+        assert abs(said.errors(record.truth)["period"]) < 3.0
+        assert said.values["period"].u > 1e-3 * said.values["period"].value
+        assert "damping_rate" not in said.values

@@ -16,7 +16,7 @@ from pipeline.track import F8
 from springmass.charts.chart import Chart, ChartNote, Panel, Series, decoded, line_of, to_json
 from springmass.charts.draw import render
 from springmass.charts.run import charts_of
-from springmass.charts.several import comparison, course, drag_map, overlay
+from springmass.charts.several import CourseValue, comparison, course, drag_map, overlay
 
 DATA = sm.sample_data()
 
@@ -155,11 +155,12 @@ def test_several_runs(damped: Analysis) -> None:
     _, k = chart.xy("spring constant")
     np.testing.assert_allclose(k, [each.value for each in found.each], rtol=1e-6)
     np.testing.assert_allclose(chart.xy("residual", 1)[1], found.pulls, atol=1e-6)
-    many = Drawn(
-        course("period / s", [("x", 0.8, 0.1), ("y", 0.9, 0.2), ("z", 90.0, 0.2)], {"z": "far from the others"})
-    )
-    assert many.xy("value")[1] == pytest.approx([0.8, 0.9])
-    assert many.json["panels"][0]["names"] == ["x", "y", "z"]
+    rows = [CourseValue("x", "A", 0.8, 0.1), CourseValue("z", "B", 90.0, 0.2), CourseValue("y", "A", 0.9, 0.2)]
+    many = Drawn(course("period / s", "group", rows, {"z": "far from the others"}))
+    x, period = many.xy("value")
+    assert period == pytest.approx([0.8, 0.9])
+    assert list(np.round(x)) == [1.0, 1.0]
+    assert many.json["panels"][0]["names"] == ["A", "B"]
     assert many.json["panels"][0]["range"][1] < 2.0
 
 
