@@ -64,8 +64,8 @@ def fit_findings(fitted: Oscillation) -> Iterator[Notice]:
         yield Notice("strongly_damped", {"why": fitted.why})
     elif fitted.why:
         yield Notice("not_converged", {"tried": fitted.why})
-    if fitted.misfit:
-        yield Notice("not_converged", {"why": fitted.misfit})
+    if fitted.refused is not None:
+        yield Notice("not_converged", {fitted.refused.code: "", **fitted.refused.numbers})
 
 
 def motion_findings(fitted: Oscillation) -> Iterator[Notice]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -95,6 +95,18 @@ class Waveform:
         return self.moving()
 
 
+RefusalCode = Literal["too_long", "misfit", "no_minimum", "driven", "no_frequency"]
+"""It takes too long to solve, leaves more than noise, has no minimum, or its best law drives the motion or stops it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """Why the equation of motion was not fitted, although the damping requires it: a code and its numbers."""
+
+    code: RefusalCode
+    numbers: Mapping[str, float | str]  # as the sentences of "not_converged" call them
+
+
 Method = Literal["windows", "samples", "equation"]
 """What the motion was fitted to."""
 
@@ -111,7 +123,7 @@ class Oscillation:
     waveform: Waveform  # including the modes
     method: Method
     why: str  # what a method that failed, or the equation of motion, came to
-    misfit: str  # why the equation of motion was not fitted, although the damping requires it
+    refused: Refusal | None  # of the equation of motion
 
     @property
     def flags(self) -> U8:
