@@ -34,6 +34,7 @@ MAINS_HZ, MAINS_SHARE = (50.0, 60.0, 100.0, 120.0), 0.01
 # Ratio to the main frequency from which a line is an overtone; the modes in windows are sought below it.
 OVERTONE = 3.4
 APART = 1.0  # least distance of two lines in reciprocals of the length of the record, as those of a beat
+SIDEBANDS = 3.0  # distance in the same unit within which a decay or a change of the frequency has sidebands
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,8 +234,12 @@ def find_apart(samples: Samples) -> Apart | None:
     first = float(omega[np.argmax(power)])
     for second in _others(record, first, omega, power):
         lines = record.fitted(record.linear((first, 0.0), (second, 0.0)))
-        # What the two leave beyond the noise must be below a tenth of what they describe.
+        # What the two leave beyond the noise must be below a tenth of what they describe. Close lines must leave noise
+        # only, because a frequency that changes has sidebands.
         if lines is None or lines.left > min(NEGLIGIBLE**2 + (samples.noise / record.scale) ** 2, NEGLIGIBLE):
+            continue
+        close = float(np.ptp(lines.omegas)) * record.seconds < SIDEBANDS * math.tau
+        if close and not lines.leaves_noise(samples):
             continue
         for number in (0, 1):
             if (cause := _cause(lines, number)) is not None:
@@ -250,7 +255,10 @@ def _others(record: Scaled, first: float, omega: F8, power: F8) -> Iterator[floa
 
     Neither may be one of the noise, nor a sideband of the first one's decay.
     """
-    left = record.spectrum(record.less(record.linear((first, 0.0))))[1]
+    wave, one = np.exp(1j * first * record.tau), np.ones_like(record.tau)
+    # Times the time too, because the first line lies between two bins.
+    columns = np.stack([one, *(x for each in (wave, record.tau * wave) for x in (each.real, each.imag))], axis=1)
+    left = record.spectrum(record.values - columns @ np.linalg.lstsq(columns, record.values, rcond=None)[0])[1]
     room = APART * math.tau / record.seconds
     beside = np.abs(omega - first * np.round(omega / first))
     far = (omega > OVERTONE * first) & (beside > room + NOTICEABLE * omega)
