@@ -126,7 +126,7 @@ def assembled(
         waveform=waveform,
         method=method,
         why="",
-        misfit="",
+        refused=None,
     )
 
 

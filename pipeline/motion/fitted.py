@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -17,6 +17,7 @@ from pipeline.numerics.levels import NOTICEABLE
 from pipeline.numerics.regression import Scatter
 from pipeline.track import F8, U8
 from pipeline.windows.demodulate import Windows
+from pipeline.windows.walk import Walk
 
 TimeTable = tuple[F8, F8]  # values at ascending times, s
 
@@ -38,6 +39,7 @@ class Phase:
     lag: TimeTable | None = None  # delay of a period's sinusoid, rad; None if it is constant
     small_swings: Estimate | None = None  # angular frequency of very small swings; with a backbone or of a pendulum
     of_pendulum: bool = False  # whether these follow from the law of a pendulum
+    walk: Walk | None = None  # of amplitude and phase, if they wander at random; the frequency is that of the walk
     spread: Scatter | None = None  # of the windows' phases about a smooth curve; None of a single window
     squared_rate: float | None = None  # decrease of the squared frequency by drag, 1/s^2; None: that of the windows
 
@@ -93,6 +95,18 @@ class Waveform:
         return self.moving()
 
 
+RefusalCode = Literal["too_long", "misfit", "no_minimum", "driven", "no_frequency"]
+"""It takes too long to solve, leaves more than noise, has no minimum, or its best law drives the motion or stops it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """Why the equation of motion was not fitted, although the damping requires it: a code and its numbers."""
+
+    code: RefusalCode
+    numbers: Mapping[str, float | str]  # as the sentences of "not_converged" call them
+
+
 Method = Literal["windows", "samples", "equation"]
 """What the motion was fitted to."""
 
@@ -109,7 +123,7 @@ class Oscillation:
     waveform: Waveform  # including the modes
     method: Method
     why: str  # what a method that failed, or the equation of motion, came to
-    misfit: str  # why the equation of motion was not fitted, although the damping requires it
+    refused: Refusal | None  # of the equation of motion
 
     @property
     def flags(self) -> U8:

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from tests.pages.conftest import started
-from tests.pages.window import WindowClient, pair
+from tests.pages.window import WindowClient, pair, tracker
 
 
 @pytest.fixture(scope="module")
@@ -82,6 +82,16 @@ def test_numbers_are_those_of_the_command_line(client: tuple[WindowClient, Path]
         )
         assert shown == json.loads(capsys.readouterr().out)["estimates"]
     window.do("remove", card=card["id"])
+
+
+def test_recordings_dropped_together_are_all_read(client: tuple[WindowClient, Path]) -> None:
+    """Each by a process of its own."""
+    window, _ = client
+    assert window.drop({f"{name}.txt": tracker() for name in "abc"}, "three")[0] == 200
+    cards = window.cards()
+    assert [card["stage"] for card in cards] == ["question"] * 3
+    for card in cards:
+        window.do("remove", card=card["id"])
 
 
 def test_what_is_dropped_is_for_its_user_alone(client: tuple[WindowClient, Path]) -> None:
