@@ -133,7 +133,7 @@ def _period_words(compared: SpringComparison) -> list[str]:
     """
     moved = [(run.name, run["period"].value, run.analysis.derived) for run in compared.runs.values()]
     swinging = {name: (t, d.effective_mass_kg.value, d) for name, t, d in moved if d.effective_mass_kg is not None}
-    if len(swinging) < len(moved):
+    if len(swinging) < len(moved) or not compared.comparison.agree:  # then the masses are not the reason
         return []
     slowed = {
         name: math.sqrt(d.estimates["spring_constant"].value / mass) * t / (2.0 * math.pi)
