@@ -130,6 +130,7 @@ INPUTS: Mapping[str, Input] = {
     "rounding": Input("rounding to steps larger than the noise"),
     "held_samples": Input("distances held by the sensor"),
     "sensor_smoothing": Input("smoothing by the sensor"),
+    "random_excitation": Input("amplitude that wanders at random"),
     "implausible_motion": Input("motion that no bob on a spring makes"),
     "implausible_distance": Input("distances that no sensor measures"),
 }

@@ -1,4 +1,4 @@
-"""Take the README's pictures of the page and of a report, in headless Chromium: `make docs-figures`."""
+"""Take the pictures of the window, of the page and of a report, in headless Chromium: `make docs-figures`."""
 
 from __future__ import annotations
 
@@ -69,6 +69,30 @@ def take_page(page: Page, folder: Path) -> None:
         page.goto("about:blank")
 
 
+def take_window(page: Page, folder: Path) -> None:
+    """Take the window with a bundled recording on its card."""
+    command = springmass("page", "--no-browser")
+    environment = {**os.environ, "PYTHONUNBUFFERED": "1", "XDG_STATE_HOME": str(folder)}
+    with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        try:
+            addresses = (re.search(r"page: (http\S+)", line) for line in process.stderr)
+            page.set_viewport_size({"width": 1280, "height": 900})
+            page.goto(next(found[1] for found in addresses if found))
+            files = [sample_data() / f"damped_simulated_{each}.txt" for each in ("position", "velocity")]
+            page.locator("#files").set_input_files(files)
+            for of, value, u in (("mass of the bob", "217.6", "0.05"), ("mass of the spring", "10", "0.5")):
+                page.get_by_label(of.capitalize(), exact=True).fill(value)
+                page.get_by_label(f"u of the {of}", exact=True).fill(u)
+            page.get_by_text("13.974").first.wait_for()
+            page.wait_for_timeout(1000)
+            page.screenshot(path=HERE / "window.png")
+            page.goto("about:blank")
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.communicate()
+
+
 def take_report(page: Page, folder: Path) -> None:
     """Take the head of the report of a bundled run."""
     data = sample_data()
@@ -81,11 +105,12 @@ def take_report(page: Page, folder: Path) -> None:
 
 
 def main() -> None:
-    """Take both."""
+    """Take all."""
     with headless() as browser, TemporaryDirectory() as folder:
         page = browser.new_page()
         take_report(page, Path(folder))
         take_page(page, Path(folder))
+        take_window(page, Path(folder))
 
 
 if __name__ == "__main__":

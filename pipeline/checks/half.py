@@ -14,17 +14,19 @@ from pipeline.track import F8
 PULSES = 3
 HIGHEST_MULTIPLE = 8  # order of the harmonics of the motion that are sought
 # How far the mean moves over the amplitude of the line at twice the frequency, and the harmonic of that line over
-# it. A radial acceleration is g (1 + A^2/4 - 3/4 A^2 cos 2 phi), the magnitude of a sine
+# it. A radial acceleration is g (1 + A^2/4 - 3/4 A^2 cos 2 phi), a height
+# l A^2/4 (1 + cos 2 phi), the magnitude of a sine
 # 2/pi + 4/(3 pi) cos 2 phi - 4/(15 pi) cos 4 phi + ...
-RADIAL, MAGNITUDE, CUSPS = 1.0 / 3.0, 1.5, -0.2
+RADIAL, HEIGHT, MAGNITUDE, CUSPS = 1.0 / 3.0, 1.0, 1.5, -0.2
 
 
 def half_frequency(residual: Residual) -> Outcome | None:
     """Test for values that go through two cycles in each cycle of the motion.
 
     A line at half of the main frequency, locked to its phase, is that of the motion if the mean moves as that of a
-    radial acceleration, or if further harmonics make the values pulses, as of a magnet that passes a sensor twice. A
-    sideways swing at half of the frequency does neither. The magnitude of a sine has no such line, but cusps.
+    radial acceleration or of a pendulum's height, or if further harmonics make the values pulses, as of a magnet that
+    passes a sensor twice. A sideways swing at half of the frequency does neither. The magnitude of a sine has no such
+    line, but cusps.
     """
     if not residual.enough:
         return None
@@ -34,8 +36,8 @@ def half_frequency(residual: Residual) -> Outcome | None:
     if _locked(residual, values, 1):
         sizes = [abs(_locked(residual, values, order)) for order in range(3, HIGHEST_MULTIPLE + 1)]
         pulses = 1 + np.count_nonzero(sizes)
-        if abs(abs(moves) - RADIAL) < NEGLIGIBLE * RADIAL + SIGNIFICANT * u_moves < RADIAL:
-            found["radial"] = moves
+        if any(abs(abs(moves) - x) < NEGLIGIBLE * x + SIGNIFICANT * u_moves < x for x in (RADIAL, HEIGHT)):
+            found["moves"] = moves
         elif pulses >= PULSES and math.hypot(*sizes) > NEGLIGIBLE * residual.amplitude:
             found["pulses"] = float(pulses)
     elif any(abs(ratio - MAGNITUDE) < NEGLIGIBLE * MAGNITUDE for ratio in (level, moves)):

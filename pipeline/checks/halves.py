@@ -28,7 +28,7 @@ def compare_halves(fitted: Motion) -> tuple[Motion, tuple[Notice, ...]]:
     """
     from scipy.special import chdtrc
 
-    if not isinstance(fitted, Oscillation) or fitted.method == "equation":
+    if not isinstance(fitted, Oscillation) or fitted.method == "equation" or fitted.phase.walk is not None:
         return fitted, ()
     windows, damping, phase, rest = fitted.windows, fitted.damping, fitted.phase, fitted.rest
     of_law = _of_law(damping.best, damping, windows.t, windows.amplitude)

@@ -50,6 +50,9 @@ def judge(
         numbers_of_held = held_numbers(repeats, 1.0 / samples.track.rate_hz)
         return ((Notice("held_samples", numbers_of_held),) if repeats > 1 else ()), ()
     fitted = motion
+    if (walk := motion.phase.walk) is not None:
+        spread = Misfit(name="random_excitation", amplitude=walk.spread)
+        return (Notice("random_excitation", {"wander_rad": walk.wander, "amplitude_m": walk.amplitude}),), (spread,)
     outcomes = list(beyond_limits(samples, fitted, spring=scene.hangs_on_spring))
     if lost is not None:
         missing = {"places": lost.places, "share": lost.share}

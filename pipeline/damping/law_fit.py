@@ -181,14 +181,20 @@ def least_chi2(fits: Mapping[str, Fit], laws: Mapping[str, Law] = LAWS) -> dict[
     return least
 
 
-def weigh(law: Law, fit: Fit, least_chi2: float, points: int, correlation: float, unit: str) -> LawFit:
-    """Test the fit of a law against points, of which ``correlation`` count as one; ``least_chi2`` is for the BIC."""
+def weigh(
+    law: Law, fit: Fit, least_chi2: float, points: int, correlation: float, independent: float, unit: str
+) -> LawFit:
+    """Test the fit of a law against points, of which ``correlation`` count as one.
+
+    ``least_chi2``, and the number of ``independent`` values of the amplitude that a parameter has to explain, are for
+    the BIC.
+    """
     count = len(law.parameters)
     covariance = correlation * fit.covariance
     free = points - count
     dof = max(free / correlation, 1.0) if free > 0 else 0.0
     reduced = fit.cost / free if free > 0 else math.nan
-    bic = least_chi2 / correlation + count * math.log(max(points / correlation, 2.0))
+    bic = least_chi2 / correlation + count * math.log(max(independent, 2.0))
     rejection: Rejection = ""
     if dof > 0 and reduced > chi2_quantile(1.0 - FALSE_ALARM, dof) / dof:
         rejection = "misfit"

@@ -214,7 +214,7 @@ def _weighed(laws: Mapping[str, Law], points: _Points, unit: str) -> tuple[dict[
     least = least_chi2(sound, laws)
     correlation, weighed = points.spread.correlation, {}
     for name, fit in sound.items():
-        one = weigh(laws[name], fit, least[name], y.size, correlation, unit)
+        one = weigh(laws[name], fit, least[name], y.size, correlation, y.size / correlation, unit)
         weighed[name] = _widened(one, (y - one.amplitude(t)) / u, correlation) if one.rejection == "misfit" else one
     return weighed, {name: why for name, why in reasons.items() if why}
 

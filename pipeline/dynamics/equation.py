@@ -31,18 +31,18 @@ class Equation:
     angular_frequency_per_s : float, 1/s
         Angular frequency :math:`\\omega_0` of the undamped motion at infinitesimal amplitude; positive.
     gamma_per_s : float, 1/s
-        Viscous drag :math:`\\gamma`: half the force per mass and speed; 0 or more.
+        Viscous drag :math:`\\gamma`: half the force per mass and speed; negative, it drives the motion.
     drag_per_m : float, 1/m
-        Quadratic drag b: the force per mass and squared speed; 0 or more.
+        Quadratic drag b: the force per mass and squared speed; negative, it drives the motion.
     friction_m_per_s2 : float, m/s^2
-        Friction f: the force per mass; 0 or more.
+        Friction f: the force per mass; negative, it drives the motion.
     cubic_per_m2_s2 : float, 1/(m^2 s^2)
         Cubic coefficient c of a hardening (positive) or softening (negative) spring.
 
     Raises
     ------
     DynamicsError
-        If a coefficient is no number, too large or of the wrong sign; the message names it.
+        If a coefficient is no number or too large; the message names it.
     """
 
     angular_frequency_per_s: float
@@ -54,8 +54,6 @@ class Equation:
     def __post_init__(self) -> None:
         for name in self.__slots__:
             value = demand_number(getattr(self, name), name)
-            if value < 0.0 and name != "cubic_per_m2_s2":
-                raise DynamicsError(f"{name} must be 0 or more, got {value:g}")
             object.__setattr__(self, name, value)
         if not self.angular_frequency_per_s > 1.0 / LARGEST:
             raise DynamicsError(f"angular_frequency_per_s must be positive, got {self.angular_frequency_per_s:g}")

@@ -50,7 +50,8 @@ def apart_finding(line: Apart) -> Notice:
 
 def several_findings(samples: Samples, motion: Oscillation, notices: tuple[Notice, ...]) -> Iterator[Notice]:
     """Yield the lines that describe a recording, if one oscillation does not."""
-    if motion.damping.admissible and all(found.code != "model_misfit" for found in notices):
+    contradicted = not motion.damping.admissible or any(found.code == "model_misfit" for found in notices)
+    if motion.phase.walk is not None or not contradicted:
         return
     lines = find_several(samples)
     if lines is not None and lines.are_several() and lines.leaves_noise(samples):
@@ -63,8 +64,8 @@ def fit_findings(fitted: Oscillation) -> Iterator[Notice]:
         yield Notice("strongly_damped", {"why": fitted.why})
     elif fitted.why:
         yield Notice("not_converged", {"tried": fitted.why})
-    if fitted.misfit:
-        yield Notice("not_converged", {"why": fitted.misfit})
+    if fitted.refused is not None:
+        yield Notice("not_converged", {fitted.refused.code: "", **fitted.refused.numbers})
 
 
 def motion_findings(fitted: Oscillation) -> Iterator[Notice]:
@@ -77,7 +78,8 @@ def motion_findings(fitted: Oscillation) -> Iterator[Notice]:
         lost = {"periods": windows.lost, "all_periods": windows.lost + count}
         yield Notice("missing_samples", lost, "warning")
     # In computed data drag itself shifts the frequency, by the square of the decrease of the amplitude in a radian.
-    if phase.bend is not None and abs(fitted.shift) > (fitted.damping.best.rate_at_start() / omega) ** 2:
+    least = (fitted.damping.best.rate_at_start() / omega) ** 2
+    if phase.bend is not None and phase.walk is None and abs(fitted.shift) > least:
         yield _changing(fitted)
     # In computed data, changes of the rest position below the error of the sinusoidal model affect no number.
     errors = model_error(windows.amplitude, windows.decay, windows.angular_frequency)

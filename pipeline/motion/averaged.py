@@ -121,7 +121,7 @@ def assembled(
         waveform=waveform,
         method=method,
         why="",
-        misfit="",
+        refused=None,
     )
 
 

@@ -10,13 +10,13 @@ The model, :class:`Solved`, is the free motion of a bob at any times and for any
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 
-from pipeline.damping.law_fit import NEGATIVE, least_chi2, mean_squared_rate, weigh
+from pipeline.damping.law_fit import least_chi2, mean_squared_rate, weigh
 from pipeline.damping.laws.drag import COEFFICIENTS, DRAGS, Drag
 from pipeline.damping.select import Damping, select_law
 from pipeline.dynamics.equation import Equation, Problem, Real
@@ -24,11 +24,11 @@ from pipeline.dynamics.integrator import Trajectory
 from pipeline.dynamics.strang import STRANG
 from pipeline.modes.mode import Modes
 from pipeline.motion.fit import Rows, clipped, fit
-from pipeline.motion.fitted import Oscillation, Phase, RestPosition, Waveform, wrapped
+from pipeline.motion.fitted import Oscillation, Phase, Refusal, RestPosition, Waveform, wrapped
 from pipeline.motion.relaxation import LEAST_DAMPING
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import CENTRAL_STEP, Fit, central_differences
-from pipeline.numerics.levels import MISFIT, NOTICEABLE
+from pipeline.numerics.levels import FEWEST_FOR_CURVE, MISFIT, NOTICEABLE
 from pipeline.numerics.regression import correlation_length
 from pipeline.parts.stopping import stop_row
 from pipeline.samples.condition import Samples
@@ -40,7 +40,7 @@ STATE = ("rest", "displacement", "velocity", "angular_frequency")
 # Time step in radians: interpolation errs by 1e-7 of the amplitude, and splitting under weak drag by 1e-6, as measured
 # by `python -m benchmarks.dynamics`.
 STEP = 0.08
-REACH = 3.0  # maximum ratio, either way, of a frequency to its start value
+REACH = 3.0  # maximum ratio, either way, of a frequency to its start value, and of a growing amplitude
 
 
 def envelope(y: float, v: float, omega: float, mu: float, gamma: float, beta: float) -> tuple[float, float, float]:
@@ -81,9 +81,7 @@ def envelope(y: float, v: float, omega: float, mu: float, gamma: float, beta: fl
 class FreeMotion:
     """Distances from the sensor for the parameters (o, y0, v0, omega0, mu, gamma, beta), with the start at t = 0.
 
-    Negative coefficients, which an unbounded fit must be able to pass through, have no equation of motion. For them
-    the motion is continued from zero as an odd function, :math:`x(-c) = 2x(0) - x(c)`. This is smooth to first order,
-    which suffices for a coefficient within a few standard uncertainties of zero.
+    A negative coefficient, which an unbounded fit must be able to pass through, drives the motion.
     """
 
     seconds: float  # the motion is solved up to this time
@@ -92,14 +90,13 @@ class FreeMotion:
     _kept: dict[bytes, Trajectory] = field(default_factory=dict)
 
     def position(self, t: F8, theta: F8) -> F8:
-        """Return the distances (n,); NaN for parameters that are not finite or a frequency far from the start."""
+        """Return the distances (n,); NaN for parameters that are not finite or far from those of a decay."""
         if not (np.all(np.isfinite(theta)) and self.omega / REACH < theta[3] < REACH * self.omega):
             return np.full(t.size, np.nan)
-        found: F8 = theta[0] + self.trajectory(theta).at(t)
-        if np.any(theta[4:] < 0.0):
-            at_zero = np.concatenate([theta[:4], np.maximum(theta[4:], 0.0)])
-            found = 2.0 * (theta[0] + self.trajectory(at_zero).at(t)) - found
-        return found
+        driving = np.maximum(-theta[len(STATE) :], 0.0) @ (1.0 / self.amplitude, 1.0, self.amplitude)
+        if driving * self.seconds > math.log(REACH):
+            return np.full(t.size, np.nan)
+        return np.asarray(theta[0] + self.trajectory(theta).at(t))
 
     def derivatives(self, t: F8, theta: F8, slots: list[int]) -> F8:
         """Return the derivatives (n, p) by the parameters with indices ``slots``; coefficients not among them are zero.
@@ -114,17 +111,6 @@ class FreeMotion:
             (\\omega_0\\,\\partial_{\\omega_0} + v_0\\,\\partial_{v_0}
             + \\mu\\,\\partial_\\mu + \\gamma\\,\\partial_\\gamma + \\beta\\,\\partial_\\beta)\\,y &= t\\,\\dot y
         """
-        count = len(STATE)
-        below = [slot for slot in range(count, theta.size) if theta[slot] < 0.0]
-        found = self._slopes(t, np.concatenate([theta[:count], np.abs(theta[count:])]), slots)
-        if below:
-            at_zero = self._slopes(t, np.concatenate([theta[:count], np.maximum(theta[count:], 0.0)]), slots)
-            # The derivative by a negative coefficient equals that at its absolute value, as the continuation is odd.
-            found = np.where(np.isin(slots, below), found, 2.0 * at_zero - found)
-        return found
-
-    def _slopes(self, t: F8, theta: F8, slots: list[int]) -> F8:
-        """Return the derivatives (n, p) if no coefficient is negative."""
         path, amplitude, rate = self.trajectory(theta), self.amplitude, 0.01 * self.omega
         scale = dict(zip(range(len(STATE), theta.size), (rate * amplitude, rate, rate / amplitude), strict=True))
         y, speed = path.at(t), self._velocity(path, t)
@@ -161,11 +147,11 @@ class FreeMotion:
         return -equation.spring(y) - drag - equation.friction_m_per_s2 * np.sign(v)
 
     def trajectory(self, theta: F8) -> Trajectory:
-        """Return the solution about the rest position, with the absolute values of the coefficients."""
+        """Return the solution about the rest position."""
         key = theta[1:].tobytes()
         if key not in self._kept:
             _, y, v, omega, mu, gamma, beta = (float(x) for x in theta)
-            equation = Equation.from_laws(omega, gamma_per_s=abs(gamma), beta_per_m_s=abs(beta), mu_m_per_s=abs(mu))
+            equation = Equation.from_laws(omega, gamma_per_s=gamma, beta_per_m_s=beta, mu_m_per_s=mu)
             # A fit evaluates residuals and derivatives at the same point, so the latest trajectories are cached.
             while len(self._kept) > 2 * len(COEFFICIENTS):
                 self._kept.pop(next(iter(self._kept)))
@@ -203,8 +189,10 @@ class Solved:
 LONGEST_SOLVED = 250
 
 
-def fit_equation(samples: Samples, windows: Windows, damping: Damping, *, stopped: bool) -> Oscillation | str | None:
-    """Fit the equation of motion if the damping requires it; return the reason if that fails.
+def fit_equation(
+    samples: Samples, windows: Windows, damping: Damping, *, stopped: bool
+) -> Oscillation | Refusal | None:
+    """Fit the equation of motion if the damping requires it, or refuse it.
 
     The result is None if damping is weak, if no law with damping can be fitted, or if linear drag or no damping is
     selected, for which the amplitude law is exact. The parameters are the rest position, displacement and velocity at
@@ -216,43 +204,38 @@ def fit_equation(samples: Samples, windows: Windows, damping: Damping, *, stoppe
     compared with this noise and selected by the same rules as the amplitude laws.
     """
     ratio = damping.best.rate_at_start() / windows.angular_frequency
-    laws, unit = _fittable(damping), samples.track.unit
+    laws = _fittable(damping)
     if not laws or not _required(damping, windows, ratio, stopped=stopped):
         return None
     periods = windows.angular_frequency / (2.0 * math.pi) * float(np.ptp(windows.t))
     if ratio <= NOTICEABLE and periods > LONGEST_SOLVED:
-        return (
-            f"the bob stops within the record, but over {periods:.0f} periods the equation of motion takes too long to "
-            f"solve (at most {LONGEST_SOLVED}), so it is open whether friction stopped it: the averaged law stands"
-        )
-    words = f"the damping ratio is {ratio:.2g} at the start, where laws of the amplitude err"
+        return Refusal("too_long", {"periods": periods, "most_periods": LONGEST_SOLVED})
+    numbers: dict[str, float | str] = {"damping_ratio": ratio, "law": laws[-1].words}
     rows, size = _rows(samples, windows, damping), abs(float(damping.best.joint.values[0]))
     motion, expected = FreeMotion(float(np.max(rows.t)), windows.angular_frequency, size), rows.u
     models = [Solved(law, motion) for law in laws]
-    start = _first_solution(models, rows, windows, damping)
-    found, rows = clipped(models[-1], rows, start, least=expected, rounds=3)
-    left, count = rows.left(models[-1], found.values)[rows.used], models[-1].full(found.values).size
-    noise = math.sqrt(float(left @ left) / (left.size - count)) if left.size > count else math.inf
-    if not noise <= MISFIT * expected:
-        return (
-            f"{words}, and the equation of motion with {laws[-1].words} leaves more than the noise of the samples, "
-            f"{amount(expected, unit)}: the averaged law stands"
-        )
+    # An average of samples has less noise between neighbours than about a sinusoid, which in turn errs where damping is
+    # strongest: the quarter of the windows that it fits best shows the noise.
+    every, scatter = rows, max(expected, float(np.quantile(windows.noises, 0.25)))
+    for starts in (_by_amplitude(models, windows, damping), _by_first_samples(models, rows, windows.angular_frequency)):
+        start = _nearest(models[-1], every, starts)
+        found, rows = clipped(models[-1], every, start[models[-1].slots], least=expected, rounds=3)
+        left, count = rows.left(models[-1], found.values)[rows.used], found.values.size
+        noise = math.sqrt(float(left @ left) / (left.size - count)) if left.size > count else math.inf
+        if noise <= MISFIT * scatter:
+            break
+    else:
+        return Refusal("misfit", {**numbers, "rms_m": noise, "noise_m": scatter})
     noise = max(noise, 0.01 * expected)
     correlation, rows = correlation_length(left), replace(rows, u=noise)
-    chosen = _chosen(models, rows, found.values, correlation, damping, unit)
+    chosen = _chosen(models, rows, found.values, correlation, damping, samples.track.unit)
     if chosen is None:
-        return f"{words}, and no fit of the equation of motion converged"
-    damping, model, own = chosen
-    fitted = _described(samples, windows, damping, model, rows, own)
+        return Refusal("no_minimum", numbers)
+    damping, fits = chosen
+    model = next(model for model in models if model.law is damping.best.law)
     if damping.best.rate_at_start() < 0.0:
-        return (
-            f"the bob stops within the record, but the equation of motion with {model.law.words} "
-            "would let it swing up: no damping ended this motion, and the averaged law stands"
-        )
-    if isinstance(fitted, str):
-        return f"{fitted}; so strong a damping leaves no oscillation whose frequency could be given"
-    return fitted
+        return Refusal("driven", {"law": model.law.words})
+    return _described(samples, windows, damping, model, rows, fits)
 
 
 def _fittable(damping: Damping) -> list[Drag]:
@@ -294,27 +277,6 @@ def _rows(samples: Samples, windows: Windows, damping: Damping) -> Rows:
     )
 
 
-def _first_solution(models: Sequence[Solved], rows: Rows, windows: Windows, damping: Damping) -> F8:
-    """Return the solution of the law with most parameters: the first acceptable one, or else the best.
-
-    If friction ends the motion, chi-square has a separate minimum for each whole number of swings. A solution that
-    leaves more than noise, or has a negative coefficient, is not accepted. The first start is the best of those from
-    the amplitude laws; each further one is the fit of one kind of damping alone, started from the best point of a grid.
-    """
-    richest, ends = models[-1], []
-    for alone in (None, *(model for model in models if len(model.law.powers) == 1)):
-        if alone is None:
-            start = _nearest(richest, rows, _by_amplitude(models, windows, damping))
-        else:
-            first = _nearest(richest, rows, _by_first_samples(alone, rows, windows.angular_frequency))
-            start = alone.full(fit(alone, rows, first[alone.slots]).values)
-        ends.append(end := fit(richest, rows, start[richest.slots]))
-        u = np.sqrt(np.diag(end.covariance))
-        if end.cost <= MISFIT**2 * end.residual.size and np.all((end.values >= -NEGATIVE * u)[len(STATE) :]):
-            break
-    return min(ends, key=lambda end: end.cost).values
-
-
 def _nearest(model: Solved, rows: Rows, starts: Iterator[F8]) -> F8:
     """Return the start values (7,) whose motion comes nearest to the samples."""
     t, y = rows.t[rows.used], rows.y[rows.used]
@@ -344,53 +306,86 @@ def _by_amplitude(models: Sequence[Solved], windows: Windows, damping: Damping) 
         yield model.full(np.array([*state, *np.maximum(values[1:], 0.0)]))
 
 
-def _by_first_samples(model: Solved, rows: Rows, omega: float) -> Iterator[F8]:
-    """Yield start values from a parabola through the first samples, with a range of strengths of one damping term."""
+def _by_first_samples(models: Sequence[Solved], rows: Rows, omega: float) -> Iterator[F8]:
+    """Yield start values from a parabola through the first samples, with a range of strengths of one damping term.
+
+    Friction that stops the bob within two periods leaves no amplitudes of windows from which a fit could start.
+    """
     y, t = rows.y[rows.used], rows.t[rows.used]
     rest = float(np.median(y[-max(y.size // 10, 5) :]))
     # The parabola is fitted to the samples of the first 0.8 rad, but to at least five.
     early = slice(max(int(np.count_nonzero(t < 0.8 / omega)), 5))
     speed, level = np.polynomial.polynomial.polyfit(t[early], y[early] - rest, 2)[1::-1]
-    size, (power,) = np.hypot(level, speed / omega), model.law.powers
-    for near in (0.9, 1.0, 1.1):
-        for ratio in (0.03, 0.06, 0.1, 0.15, 0.25):
-            yield model.full(np.array([rest, level, speed, near * omega, ratio * omega * size ** (1 - power)]))
+    size = np.hypot(level, speed / omega)
+    for model in (model for model in models if len(model.law.powers) == 1):
+        for near in (0.9, 1.0, 1.1):
+            for ratio in (0.03, 0.06, 0.1, 0.15, 0.25):
+                term = ratio * omega * size ** (1 - model.law.powers[0])
+                yield model.full(np.array([rest, level, speed, near * omega, term]))
 
 
 def _chosen(
     models: Sequence[Solved], rows: Rows, start: F8, correlation: float, damping: Damping, unit: str
-) -> tuple[Damping, Solved, Fit] | None:
-    """Fit every law, from the solution of the last, and select one; None if no fit has a finite covariance."""
-    richest = models[-1]
-    by_name = {model.law.name: model for model in reversed(models)}
+) -> tuple[Damping, dict[str, Fit]] | None:
+    """Fit the laws from the solution of the last, and select among them; None if no fit has a finite covariance.
+
+    The other laws are restrictions of the last, from whose minimum theirs follow to first order. Then only the selected
+    law is fitted, and those that chi-square does not clearly reject.
+    """
+    richest, by_name = models[-1], {model.law.name: model for model in reversed(models)}
     unfitted = {name: "it has no equation of motion" for name in damping.fits if name not in by_name}
-    whole = fit(richest, rows, start)
-    fits: dict[str, Fit] = {}
+    whole, fits, exact = fit(richest, rows, start), dict[str, Fit](), set[str]()
     for name, model in by_name.items():
-        own = whole if model is richest else fit(model, rows, richest.full(whole.values)[model.slots])
-        if np.isfinite(own.covariance).all():
-            fits[name] = own
+        if np.isfinite(whole.covariance).all():
+            fits[name] = _restricted(whole, richest, model)
+            exact = {richest.law.name}
         else:
-            unfitted[name] = f"its equation of motion was not solved for its coefficients: {own.tried}"
-    if not fits:
-        return None
-    # The start amplitude replaces displacement and velocity as a parameter.
-    minima = {name: _by_envelope(by_name[name], own) for name, own in fits.items()}
-    laws = {name: by_name[name].law for name in fits}
-    least, points = least_chi2(minima, laws), int(np.count_nonzero(rows.used)) - len(STATE) + 1
-    weighed = {n: weigh(laws[n], minima[n], least[n], points, correlation, unit) for n in fits}
-    choice = select_law(weighed, damping.stated, float(np.max(rows.t)))
-    scatter = replace(damping.scatter, correlation=correlation)
+            fits[name] = fit(model, rows, richest.full(whole.values)[model.slots])
+            exact.add(name)
+    points = int(np.count_nonzero(rows.used)) - len(STATE) + 1
+    # The amplitude changes from period to period, so that a record of any rate shows as many values of it.
+    periods = richest.motion.omega * float(np.max(rows.t[rows.used])) / (2.0 * math.pi)
+    while True:
+        for name in [name for name, own in fits.items() if not np.isfinite(own.covariance).all()]:
+            unfitted[name] = f"its equation of motion was not solved for its coefficients: {fits.pop(name).tried}"
+        if not fits:
+            return None
+        # The start amplitude replaces displacement and velocity as a parameter.
+        minima = {name: _by_envelope(by_name[name], own) for name, own in fits.items()}
+        laws = {name: by_name[name].law for name in fits}
+        least, independent = least_chi2(minima, laws), max(periods, FEWEST_FOR_CURVE)
+        weighed = {n: weigh(laws[n], minima[n], least[n], points, correlation, independent, unit) for n in fits}
+        choice = select_law(weighed, damping.stated, float(np.max(rows.t)))
+        near = {name for name, own in weighed.items() if own.reduced_chi2 <= MISFIT**2 * own.limit}
+        todo = (near | {choice.selected}) - exact
+        if not todo:
+            break
+        fits |= {name: fit(by_name[name], rows, fits[name].values) for name in fits if name in todo}
+        exact |= todo
     every = Damping(
         **choice._asdict(),
         t0=damping.t0,
         fits=weighed,
-        scatter=scatter,
+        scatter=replace(damping.scatter, correlation=correlation),
         unfitted=unfitted,
         stated=damping.stated,
     )
-    own = fits[choice.selected]
-    return every, by_name[choice.selected], replace(own, covariance=own.covariance * correlation)
+    return every, {name: replace(own, covariance=own.covariance * correlation) for name, own in fits.items()}
+
+
+def _restricted(whole: Fit, richest: Solved, model: Solved) -> Fit:
+    """Return the minimum of a law within that of one with more coefficients, to first order in the missing ones."""
+    kept = [richest.slots.index(slot) for slot in model.slots]
+    missing = [i for i in range(whole.values.size) if i not in kept]
+    covariance, size = whole.covariance, whole.values[missing]
+    share = np.linalg.solve(covariance[np.ix_(missing, missing)], np.column_stack([size, covariance[missing]]))
+    values = whole.values - covariance[:, missing] @ share[:, 0]
+    return replace(
+        whole,
+        values=values[kept],
+        covariance=(covariance - covariance[:, missing] @ share[:, 1:])[np.ix_(kept, kept)],
+        cost=whole.cost + float(size @ share[:, 0]),
+    )
 
 
 def _by_envelope(model: Solved, own: Fit) -> Fit:
@@ -410,13 +405,14 @@ def _by_envelope(model: Solved, own: Fit) -> Fit:
 
 
 def _described(
-    samples: Samples, windows: Windows, damping: Damping, model: Solved, rows: Rows, own: Fit
-) -> Oscillation | str:
-    """Return the oscillation by the solution, or what was fitted if no oscillation is left.
+    samples: Samples, windows: Windows, damping: Damping, model: Solved, rows: Rows, fits: Mapping[str, Fit]
+) -> Oscillation | Refusal:
+    """Return the oscillation by the solution, unless its drag leaves none.
 
     Its squared frequency is :math:`\\omega_0^2` minus the mean decrease by drag over the whole time: to second order,
-    that of a line through the turning points.
+    that of a line through the turning points. Its u includes the scatter of this frequency over the admissible laws.
     """
+    own = fits[damping.selected]
     theta, best, unit = model.full(own.values), damping.best, samples.track.unit
     still, y, v, natural = theta[: len(STATE)].tolist()
     position = model.motion.position(rows.t, theta)
@@ -431,10 +427,13 @@ def _described(
         + amount(rms, unit)
     )
     t, t0, u = windows.t, damping.t0, np.sqrt(np.diag(own.covariance))
-    squared_rate = mean_squared_rate(best, best.amplitude(t - t0), np.ones(t.size))
-    if not squared_rate < natural**2:
-        return why
+    rates = {n: mean_squared_rate(x, x.amplitude(t - t0), np.ones(t.size)) for n, x in damping.considered.items()}
+    if not (squared_rate := rates[damping.selected]) < natural**2:
+        return Refusal("no_frequency", {"damping_ratio": best.rate_at_start() / natural, "law": model.law.words})
     omega = math.sqrt(natural**2 - squared_rate)
+    away = np.array([fits[n].values[3] ** 2 - rate - omega**2 for n, rate in rates.items()]) / (2.0 * omega)
+    odds = np.array([math.exp(0.5 * min(best.bic - x.bic, 0.0)) for x in damping.considered.values()])
+    u_omega = math.hypot(float(u[3]) * natural / omega, math.sqrt(float(odds @ away**2) / float(odds.sum())))
     slope = np.array([0.0, v * natural, -y * natural, y * v]) / (v**2 + (y * natural) ** 2)
     u_phase = math.sqrt(float(slope @ own.covariance[: len(STATE), : len(STATE)] @ slope))
     _, start, _ = envelope(*theta[1:].tolist())
@@ -444,7 +443,7 @@ def _described(
     centre = start + 2.0 * math.pi * turns + omega * (middle - t0)
     phase = Phase(
         t0=t0,
-        angular_frequency=Estimate(omega, float(u[3]) * natural / omega, "rad/s"),
+        angular_frequency=Estimate(omega, u_omega, "rad/s"),
         phase=Estimate(wrapped(start), u_phase, "rad"),
         reduced_chi2=best.reduced_chi2,
         correlation=damping.scatter.correlation,
@@ -468,5 +467,5 @@ def _described(
         waveform=waveform,
         method="equation",
         why=why,
-        misfit="",
+        refused=None,
     )

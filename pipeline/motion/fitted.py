@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -17,6 +17,7 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import Scatter
 from pipeline.track import F8, U8
 from pipeline.windows.demodulate import Windows
+from pipeline.windows.walk import Walk
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,6 +36,7 @@ class Phase:
     lag: TimeTable | None = None  # delay of a period's sinusoid, rad; None if it is constant
     small_swings: Estimate | None = None  # angular frequency of very small swings, by a law of the amplitude
     of_pendulum: bool = False  # whether this law is that of a pendulum
+    walk: Walk | None = None  # of amplitude and phase, if they wander at random; the frequency is that of the walk
     spread: Scatter | None = None  # of the windows' phases about a smooth curve; None of a single window
     squared_rate: float | None = None  # decrease of the squared frequency by drag, 1/s^2; None: that of the windows
 
@@ -95,6 +97,18 @@ class Waveform:
         return self.moving()
 
 
+RefusalCode = Literal["too_long", "misfit", "no_minimum", "driven", "no_frequency"]
+"""It takes too long to solve, leaves more than noise, has no minimum, or its best law drives the motion or stops it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """Why the equation of motion was not fitted, although the damping requires it: a code and its numbers."""
+
+    code: RefusalCode
+    numbers: Mapping[str, float | str]  # as the sentences of "not_converged" call them
+
+
 Method = Literal["windows", "samples", "equation"]
 """What the motion was fitted to."""
 
@@ -111,7 +125,7 @@ class Oscillation:
     waveform: Waveform  # including the modes
     method: Method
     why: str  # what a method that failed, or the equation of motion, came to
-    misfit: str  # why the equation of motion was not fitted, although the damping requires it
+    refused: Refusal | None  # of the equation of motion
 
     @property
     def flags(self) -> U8:

@@ -11,10 +11,11 @@ from pipeline.motion.at_rest import Rest, rest_of
 from pipeline.motion.averaged import check_coherence, fit_windows, typical_miss
 from pipeline.motion.by_samples import FEW_WINDOWS, fit_samples
 from pipeline.motion.equation import fit_equation
-from pipeline.motion.fitted import Oscillation
+from pipeline.motion.fitted import Oscillation, Refusal
 from pipeline.motion.lines import WEAKER, find_several
 from pipeline.motion.relaxation import LEAST_DAMPING, Relaxation, find_relaxation
 from pipeline.motion.two_modes import TwoModes, find_two_modes
+from pipeline.numerics.levels import VERY_STRONG
 from pipeline.options import Options
 from pipeline.parts.part import Part, check_sinusoid, start_of
 from pipeline.samples.condition import COARSE, Samples
@@ -35,14 +36,18 @@ def fit_motion(part: Part, options: Options) -> Motion:
         return _without_cycles(samples, windows)
     if (bent := check_sinusoid(samples, windows)) is not None:
         return _without_cycles(samples, bent)
-    windows, modes = separate(samples, windows, sought=options.modes)
+    windows, modes = separate(samples, windows, sought=options.modes and part.walk is None)
     windows = rounded(windows, samples.quantum)
     start_s, coarse = start_of(samples, windows.angular_frequency), (samples.quantum or 0.0) > COARSE * windows.noise
     laws = fit_laws(windows, start_s, options.laws, options.known_law, samples.track.unit, coarse=coarse)
+    if part.walk is not None:
+        fitted = fit_windows(windows, modes, laws)
+        phase = replace(fitted.phase, angular_frequency=part.walk.angular_frequency, small_swings=None, walk=part.walk)
+        return replace(fitted, phase=phase)
     solved = fit_equation(samples, windows, laws, stopped=part.stopped)
     fitted = solved if isinstance(solved, Oscillation) else _averaged(windows, modes, laws, samples, options)
-    if isinstance(solved, str):
-        fitted = replace(fitted, misfit=solved)
+    if isinstance(solved, Refusal):
+        fitted = replace(fitted, refused=solved)
     if _may_relax(fitted, laws) and isinstance(relaxed := find_relaxation(samples), Relaxation):
         return relaxed
     missed = 0.0 if fitted.method == "equation" else typical_miss(fitted)
@@ -70,6 +75,11 @@ def _averaged(windows: Windows, modes: Modes, laws: Damping, samples: Samples, o
 
 
 def _may_relax(fitted: Oscillation, laws: Damping) -> bool:
-    """Return whether the damping is strong and, if the equation of motion was fitted, linear."""
-    linear = fitted.method != "equation" or fitted.damping.best is fitted.damping.of_powers(1)
-    return linear and laws.best.rate_at_start() / fitted.windows.angular_frequency > LEAST_DAMPING
+    """Return whether the damping is strong and, as far as the equation of motion shows, linear.
+
+    Linear drag, the simpler law, stands unless another one is better by very strong evidence after its price.
+    """
+    best, alone = fitted.damping.best, fitted.damping.of_powers(1)
+    linear = alone is not None and not alone.rejected and alone.bic - best.bic <= VERY_STRONG
+    strong = laws.best.rate_at_start() > LEAST_DAMPING * fitted.windows.angular_frequency
+    return strong and (linear or fitted.method != "equation")

@@ -323,9 +323,23 @@ def _follow(t: F8, y: F8, noise: float, samples: Samples) -> Relaxation | NoOsci
 
 def _misses(rows: Rows, found: Decay) -> bool:
     """Return whether the residual is too large over the whole record or over its moving part."""
-    squares = (rows.left(DAMPED, found.values) / rows.u) ** 2
+    squares = (rows.left(DAMPED, found.values) / max(rows.u, _scatter(rows, found))) ** 2
     count = max(int(np.searchsorted(rows.t, 4.0 / found.slowest)), 12)
     return bool(max(float(np.mean(squares)), float(np.mean(squares[:count]))) > MISFIT**2)
+
+
+def _scatter(rows: Rows, found: Decay) -> float:
+    """Return the median scatter of the samples about such a motion, fitted to each turn of a radian frequency alone.
+
+    Neighbouring samples differ by less than their noise if the sensor averages them. It is 0 if a turn has too few.
+    """
+    size = int(2.0 * math.pi * rows.t.size / max(float(rows.t[-1]) * math.sqrt(found.stiffness), 1e-300))
+    if not 2 * FEWEST_FOR_CURVE <= size <= rows.t.size:
+        return 0.0
+    blocks = rows.y[: rows.y.size // size * size].reshape(-1, size).T
+    base = np.linalg.qr(damped(rows.t[:size] - rows.t[0], found.values[3:]))[0]
+    squares = np.sum((blocks - base @ (base.T @ blocks)) ** 2, axis=0)
+    return math.sqrt(float(np.median(squares)) / (size - 3))
 
 
 def _beats_other_shapes(rows: Rows, found: Decay) -> bool:

@@ -18,6 +18,7 @@ from pipeline.track import Quality
 from pipeline.units import amount, noun
 from pipeline.windows.cycles import Cycles, NoOscillation, find_cycles
 from pipeline.windows.demodulate import Windows, demodulate, follow
+from pipeline.windows.walk import Walk, walk_of
 
 # Maximum residual of an oscillation over its amplitude: parabolas leave 0.20 and square waves 0.34, as measured on one
 # period of each.
@@ -43,6 +44,7 @@ class Part:
     windows: Windows | NoOscillation
     stopped: bool = False
     lost: LostRows | None = None
+    walk: Walk | None = None  # of amplitude and phase, if they wander at random
 
     def beginning(self, start_s: float) -> Partition | None:
         """Return the partition if the motion begins at a time, before which the bob was held."""
@@ -93,6 +95,8 @@ def _free_part(samples: Samples) -> Part | NoOscillation:
         if isinstance(cycles, NoOscillation):
             return cycles
         windows = demodulate(samples, cycles)
+    if (walk := walk_of(windows)) is not None:
+        return Part(samples, partition, windows, stopped, lost, walk)
     for _ in range(ROUNDS):
         outside = free_span(samples, windows)
         if outside is None:

@@ -133,7 +133,7 @@ def derive(
     laws = _Laws(fitted.damping, inputs, fitted.windows)
     of_scene = _of_scene(track, scene, {effect.name for effect in effects if effect.included}, inputs)
     every = solve(of_scene | _of_motion(track, fitted, misfits, laws, inputs))
-    coefficients = every["coefficients"]
+    coefficients = every.get("coefficients", {})
     found = {name: (x, _unit_of(name, unit)) for name, x in every.items() if name in QUANTITIES}
     parts = {
         name: Estimate.of_variable(every[name], _unit_of(name, unit)) if name in every else None for name in _PARTS
@@ -238,7 +238,7 @@ def _of_motion(
         "rate_factor": less_certain("damping_rate", laws.values[1]),
         "law": laws.coefficients,
         "law_start": laws.start,
-        "law_rate": laws.rate_at_start,
+        "law_rate": laws.rate_at_start if phase.walk is None else None,
         "law_rms": laws.root_mean_square,
         "decays": laws.values[1] > 0 or None,
         "beta_settled": (damping.settled and damping.best.drag_term("beta") is not None) or None,

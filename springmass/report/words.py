@@ -58,6 +58,8 @@ def damping_sentence(analysis: Analysis) -> str:
     damping, quoted = analysis.damping, analysis.derived.quoted
     if not damping.fits:
         return ""
+    if isinstance(analysis.motion, Oscillation) and analysis.motion.phase.walk is not None:
+        return "Amplitude and phase wander at random, so no damping law was fitted to them."
     chosen = words_of(damping.best.law)
     used = analysis.track.t[analysis.used]
     span = f"{float(used.max() - used.min()):.0f} s"

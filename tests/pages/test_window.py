@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Locator, Page
 
-from tests.pages.bench import LIMIT_S
+from tests.pages.bench import LIMIT_S, SEEN
 from tests.pages.conftest import started, watched
 from tests.pages.window import MASS_G, excel, pair, phyphox, tracker
 
@@ -211,3 +212,65 @@ def test_two_recordings_and_the_values_of_a_report(window: Page) -> None:
     card.get_by_role("button", name="Judge my values").click()
     card.get_by_text("period 0.7585 s: agrees").wait_for()
     card.get_by_text("10 times too large").first.wait_for()
+
+
+def test_closing_with_unsaved_answers_asks(window: Page) -> None:
+    """A card that somebody has typed on asks before it is lost from sight."""
+    window.get_by_role("button", name="Try an example").click()
+    card = window.get_by_role("region", name="Example: undamped")
+    row_of(card, "spring constant")
+    card.get_by_label("Notes for this recording").fill("first spring")
+    card.get_by_label("Notes for this recording").blur()
+    window.wait_for_function("() => [...cards.values()].some(({ message }) => message.notes)")
+    with window.expect_event("dialog") as asked:
+        window.close(run_before_unload=True)
+    assert asked.value.type == "beforeunload"
+    asked.value.dismiss()
+
+
+def test_a_recording_from_the_window_becomes_a_card(window: Page, tmp_path: Path) -> None:
+    """A simulated bench: the recorder shows its live page, records there, and its run is a card with results."""
+    window.get_by_role("button", name="Record", exact=True).click()
+    window.get_by_label("Sensor at").select_option("simulate")
+    window.get_by_label("Kept in the folder").fill(str(tmp_path / "runs"))
+    window.get_by_label("Name of the recording").fill("first try")
+    with window.context.expect_page() as opening:
+        window.get_by_role("button", name="Start the recorder").click()
+    live = opening.value
+    live.wait_for_selector("#record:not([hidden])")
+    live.keyboard.press("r")
+    live.wait_for_function(SEEN.format(count=400))
+    live.keyboard.press("s")
+    live.wait_for_selector("#ask[open]")
+    live.keyboard.press("Enter")
+    live.wait_for_selector("#close:not([hidden])")
+    live.keyboard.press("q")
+    live.wait_for_selector("#ask[open]")
+    live.keyboard.press("Enter")
+    card = window.get_by_role("region", name="first-try.h5")
+    card.get_by_text("simulated, not measured").wait_for()
+    assert row_of(card, "period").startswith("0.757")
+    assert [path.suffix for path in (tmp_path / "runs").iterdir()] == [".h5"]
+
+
+@pytest.mark.trials
+def test_how_long_a_person_waits(window: Page) -> None:
+    """On two idle cores: a card of two minutes within 1 s, results within 2 s, a changed mass within 0.5 s."""
+    took = dict[str, float]()
+    window.wait_for_timeout(5000.0)  # until a process is prepared
+
+    def until(what: str, selector: str, *, since: float) -> None:
+        window.locator(selector).first.wait_for()
+        took[what] = time.monotonic() - since
+
+    begin = time.monotonic()
+    chosen(window, {name: content for name, content in pair().items() if "position" in name})
+    until("card", ".facts:not(:empty)", since=begin)
+    until("results", "tr[data-name='period'] .num", since=begin)
+    window.wait_for_timeout(1000.0)
+    window.get_by_label("Mass of the bob", exact=True).fill("217.6")
+    until("mass", "tr[data-name='spring_constant'] .num", since=time.monotonic())
+    print(took)
+    assert took["card"] < 1.0
+    assert took["results"] < 2.0
+    assert took["mass"] < 0.5

@@ -19,6 +19,7 @@ from tests.pages.bench import LIMIT_S, Client
 T = np.arange(900) / 30.0
 X_M = 0.02 + 0.05 * np.exp(-0.01 * T) * np.cos(8.0 * T) + np.random.default_rng(3).normal(0.0, 2e-4, T.size)
 MASS_G = 217.6
+SETTLED_S = 60.0
 WORKBOOK = {
     "[Content_Types].xml": '<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">'
     '<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
@@ -119,7 +120,7 @@ class WindowClient(Client):
         """Return all cards as a page sees them, once none of them waits any more."""
         from websockets.sync.client import connect
 
-        until = time.monotonic() + LIMIT_S
+        until = time.monotonic() + SETTLED_S
         origin: Any = f"http://{self.netloc}"
         with connect(
             f"ws://{self.netloc}/window/events",
@@ -129,7 +130,7 @@ class WindowClient(Client):
         ) as events:
             order, cards = None, dict[str, dict[str, Any]]()
             while time.monotonic() < until:
-                message = json.loads(events.recv(timeout=LIMIT_S))
+                message = json.loads(events.recv(timeout=SETTLED_S))
                 if message["type"] == "cards":
                     order, self.earlier = message["order"], message["earlier"]
                 elif message["type"] == "card":

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import os
 import secrets
 import shutil
 import time
 from collections.abc import AsyncIterator, Iterable, Iterator, Mapping, Sequence
-from contextlib import aclosing
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from springmass.loading.inputs import velocity_name
 from springmass.page.window.processes import Children, ProcessEnded
 from springmass.page.window.recording import RecorderProcess
 from springmass.result.output_names import plain_name
+from storage.atomic import write_whole
 
 MOST_OF_FILE, MOST_TOGETHER, MOST_FILES = 200_000_000, 1_000_000_000, 200
 KEPT_S = 24 * 3600.0
@@ -75,7 +76,7 @@ class Card:
 
     def keep(self) -> None:
         """Write what is kept."""
-        (self.folder / "card.json").write_text(json.dumps(self.kept), "utf-8")
+        write_whole(self.folder / "card.json", json.dumps(self.kept))
 
 
 class Cards:
@@ -83,7 +84,8 @@ class Cards:
 
     def __init__(self, top: Path | None = None) -> None:
         self._top = (top or user_state_path("springmass", appauthor=False)) / "window"
-        self._top.mkdir(mode=0o700, parents=True, exist_ok=True)
+        self._top.mkdir(parents=True, exist_ok=True)
+        self._top.chmod(0o700)
         self.earlier = self._sweep()
         self.folder = self._top / secrets.token_hex(8)
         self.folder.mkdir(mode=0o700)
@@ -103,12 +105,13 @@ class Cards:
         found = []
         for folder in filter(Path.is_dir, self._top.iterdir()):
             age_s = time.time() - folder.stat().st_mtime
+            if age_s <= ALIVE_S:
+                continue
             cards = [json.loads(path.read_text("utf-8")) for path in folder.glob("*/card.json")]
-            names = [card["name"] for card in cards if not card["saved"]]
-            if age_s > KEPT_S or (age_s > ALIVE_S and not names):
-                shutil.rmtree(folder, ignore_errors=True)
-            elif age_s > ALIVE_S:
+            if (names := [card["name"] for card in cards if not card["saved"]]) and age_s <= KEPT_S:
                 found.append({"id": folder.name, "names": names, "age_s": age_s})
+            else:
+                shutil.rmtree(folder, ignore_errors=True)
         return sorted(found, key=lambda each: float(each["age_s"]))
 
     def restore(self, wanted: str, *, forget: bool) -> None:
@@ -302,7 +305,7 @@ class Cards:
         """Return what a process answers; NotTaken if that is an error or a question."""
         found: dict[str, Any] = {}
         try:
-            async with aclosing(self.children.ask(holder, request, size)) as answers:
+            async with contextlib.aclosing(self.children.ask(holder, request, size)) as answers:
                 async for answer in answers:
                     found |= answer
         except ProcessEnded as error:
@@ -329,7 +332,7 @@ class Cards:
             request = {"do": "show", "card": {**card.kept}, "into": str(into)}
             try:
                 children = self.children.ask(card.id, request, card.size, lambda: self._say(card, stage="reading"))
-                async with aclosing(children) as answers:
+                async with contextlib.aclosing(children) as answers:
                     async for answer in answers:
                         await self._take(card, answer)
             except ProcessEnded as error:
@@ -346,29 +349,28 @@ class Cards:
             self._say(card, stage="analysing", **answer)
         elif "results" in answer:
             self._say(card, stage="done", why=answer["why"], version=card.state["version"] + 1)
+        elif answer.get("archive") and not card.kept.get("unpacked"):
+            self._tasks.add(task := asyncio.create_task(self._unpack(card, answer)))
+            task.add_done_callback(self._tasks.discard)
         elif "question" in answer:
             fields = {each["name"]: each for each in (*card.kept.get("asked", ()), *answer["question"]["fields"])}
             card.kept["asked"] = [*fields.values()]
             card.keep()
-            self._say(card, stage="question", **answer)
-        elif "problem" in answer and answer["archive"] and not card.kept.get("unpacked"):
-            self._tasks.add(task := asyncio.create_task(self._unpack(card, answer)))
-            task.add_done_callback(self._tasks.discard)
+            self._say(card, stage="question", question=answer["question"])
         elif "problem" in answer:
             self._say(card, stage="failed", problem=_joined(answer))
         else:
             self._say(card, **answer)
 
-    async def _unpack(self, card: Card, refusal: Mapping[str, Any]) -> None:
-        """Make a card of each file of an archive that is no recording itself."""
+    async def _unpack(self, card: Card, otherwise: dict[str, Any]) -> None:
+        """Make a card of each file of an archive; if none may be a recording, say what its reader said."""
         place = self._new_folder()
-        try:
+        with contextlib.suppress(NotTaken):
             await self.ask("unpack", {"do": "unpack", "path": card.kept["path"], "into": str(place)}, card.size)
-            found = [*_recordings(place)]
-        except NotTaken:
-            found = []
+        found = [*_recordings(place)]
+        card.kept["unpacked"] = True
         if not found or card.id not in self.cards:
-            self._say(card, stage="failed", problem=_joined(refusal))
+            await self._take(card, otherwise)
             return
         self.remove(card.id)
         for kept in found[: MOST_FILES - len(self.cards)]:

@@ -22,6 +22,7 @@ import numpy as np
 from acquisition.errors import visible
 from acquisition.recordings.families.archive import members
 from acquisition.recordings.identify import read_bytes, sniff
+from acquisition.recordings.questions import Missing
 from acquisition.recordings.reading import value_of
 from pipeline.bench.scene import Scene
 from springmass.charts.draw import save
@@ -44,6 +45,7 @@ from storage.atomic import write_whole
 
 Request = Mapping[str, Any]
 Answer = dict[str, Any]
+PHYPHOX = b"meta/device.csv"
 
 
 class Opened:
@@ -178,12 +180,16 @@ def answers(opened_here: Opened, request: Request) -> Iterator[Answer]:
 
 
 def _why(failed: Failed, where: str) -> Answer:
-    """Return a question, or why there are no results, in words without the path of our copy."""
-    if failed.question is not None:
-        return {"question": asked(failed.question)}
+    """Return a question, or why there are no results, in words without the path of our copy.
+
+    ``archive`` says that its files may be recordings by themselves; those of phyphox's export belong together.
+    """
+    asks, archive = failed.question, attempted(failed.task, partial(sniff, where)) == "zip"
+    if asks is not None:
+        several = archive and Missing.RUN in asks.question.missing and PHYPHOX not in read_bytes(where)
+        return {"question": asked(asks), "archive": several}
     error, folder = failed.error, f"{Path(where).parent}{os.sep}" if where else ""
     problem, remedy = (visible(text.replace(folder, "") if folder else text) for text in (error.problem, error.remedy))
-    archive = attempted(failed.task, partial(sniff, where)) == "zip"
     return {"problem": problem, "remedy": in_fields(remedy), "archive": archive}
 
 

@@ -1,14 +1,11 @@
 """Motions that the models describe: numbers lie within four u, and no right fit is refused.
 
-``SPRINGMASS_TRIALS=20 pytest -m trials tests/trials/troubles/test_described.py`` for twenty records of each kind. What
-fails is listed with its reason and a record that shows it; a kind that is mended makes its test say so.
+``SPRINGMASS_TRIALS=20 pytest -m trials tests/trials/troubles/test_described.py`` for twenty records of each kind.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -25,51 +22,13 @@ MOST_SPREAD = 1.5
 pytestmark = pytest.mark.trials
 
 
-class Failure(NamedTuple):
-    """Why a kind fails today, and the seed of a record that shows it."""
-
-    reason: str
-    seed: int = 0
-
-
-QUOTED = "a law counts as the only one although a richer one was dearer alone: its coefficients are off"
-REFUSED = "a fit that is right is refused, because an average of samples has less noise between neighbours"
-
-FAILURES: Mapping[str, Failure] = {
-    "friction: stops the bob, 1 mm/s": Failure(QUOTED, 14),
-    "friction: stops the bob, 4 mm/s": Failure(QUOTED, 8),
-    "averaging sensor: 2 samples, ratio 0.02": Failure(REFUSED, 1),
-    "averaging sensor: 4 samples, ratio 0.05": Failure(REFUSED, 1),
-    **{
-        f"averaging sensor: {size} samples, ratio {ratio:g}": Failure(REFUSED)
-        for size in (2, 4)
-        for ratio in (0.05, 0.1, 0.145, 0.2, 0.3)
-        if (size, ratio) != (4, 0.05)
-    },
-}
-
-
-def _cases(names: Mapping[str, Kind], failures: Mapping[str, Failure]) -> list[object]:
-    """Return every kind, those that fail today as strict expected failures."""
-    assert failures.keys() <= names.keys()
-    return [
-        pytest.param(
-            kind,
-            id=name,
-            marks=pytest.mark.xfail(strict=True, reason=failures[name].reason) if name in failures else (),
-        )
-        for name, kind in names.items()
-    ]
-
-
 NAMED = {kind.name: kind for kind in KINDS}
 
 
-@pytest.mark.parametrize("kind", _cases(NAMED, FAILURES))
+@pytest.mark.parametrize("kind", [pytest.param(kind, id=name) for name, kind in NAMED.items()])
 def test_what_is_stated_is_right_and_no_fit_is_refused(kind: Kind) -> None:
     """Estimates and the coefficients that may be quoted lie within four u, and no equation is said to have failed."""
-    seeds = [*range(SEEDS), *([FAILURES[kind.name].seed] if kind.name in FAILURES else [])]
-    verdicts = {seed: try_one(kind, seed, "standard") for seed in seeds}
+    verdicts = {seed: try_one(kind, seed, "standard") for seed in range(SEEDS)}
     off = {
         seed: {name: round(given.z, 1) for name, given in one.given.items() if given.z > LIMIT} or one.word
         for seed, one in verdicts.items()

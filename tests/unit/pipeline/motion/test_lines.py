@@ -88,3 +88,14 @@ def test_uneven_times_show_a_line_beyond_half_of_their_rate(mean_s: float, jitte
             assert "undersampled" not in codes
         else:
             assert codes & {"undersampled", "no_oscillation"}
+
+
+def test_a_shaken_structure_has_a_period_and_no_damping_rate() -> None:
+    """Its amplitude and phase wander at random: u of the period is that of the walk of the phase."""
+    for seed in range(3):
+        record = kinds.trouble("ambient", seed)
+        said = record.said()
+        assert said.warnings == {"random_excitation"}
+        assert abs(said.errors(record.truth)["period"]) < 3.0
+        assert said.values["period"].u > 1e-3 * said.values["period"].value
+        assert "damping_rate" not in said.values
