@@ -93,16 +93,10 @@ class Block:
         if step != 1:
             raise ValueError(f"expected a slice of step 1, got step {step}; index the arrays of the block instead")
         cut = slice(start, stop)
-        return Block(
-            self.first + start,
-            self.t[cut],
-            self.distance[cut],
-            self.flags[cut],
-            None if self.host_ns is None else self.host_ns[cut],
-            None if self.velocity is None else self.velocity[cut],
-            self.quantity,
-            self.unit,
-        )
+        host_ns = None if self.host_ns is None else self.host_ns[cut]
+        velocity = None if self.velocity is None else self.velocity[cut]
+        t, distance, flags = self.t[cut], self.distance[cut], self.flags[cut]
+        return Block(self.first + start, t, distance, flags, host_ns, velocity, self.quantity, self.unit)
 
 
 def concatenate(blocks: Iterable[Block]) -> Block:

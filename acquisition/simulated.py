@@ -13,7 +13,7 @@ import socket
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -126,16 +126,6 @@ class VirtualRangefinder:
         return 0.0
 
 
-class _Line(Protocol):
-    """Where bytes are written that a port reads; ``write`` raises BlockingIOError or ConnectionError if none does."""
-
-    path: str
-
-    def write(self, data: memoryview) -> int: ...
-
-    def close(self) -> None: ...
-
-
 class _PseudoTerminal:
     """A pseudo-terminal; raises ImportError on Windows."""
 
@@ -183,7 +173,8 @@ class _NetworkPort:
         self._listener.close()
 
 
-def _line() -> _Line:
+def _line() -> _PseudoTerminal | _NetworkPort:
+    """Return where bytes are written that a port reads; without a reader its ``write`` raises an OSError."""
     try:
         return _PseudoTerminal()
     except ImportError:

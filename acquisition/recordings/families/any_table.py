@@ -15,13 +15,14 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import zip_longest
 
 import numpy as np
 
 from acquisition.recordings.recording import FormatIssue
+from acquisition.recordings.tables.blocks import FEWEST_ROWS
 from acquisition.recordings.tables.format import text_format
 from acquisition.recordings.tables.headings import Heading, headings_of, is_time, split_heading
 from acquisition.recordings.tables.layout import (
@@ -34,12 +35,11 @@ from acquisition.recordings.tables.layout import (
     times_by_steps,
     wrong_commas,
 )
-from acquisition.recordings.tables.numbers import is_lost, parse_number
+from acquisition.recordings.tables.numbers import is_lost, is_quantity, parse_number, quantity
 from acquisition.recordings.tables.table import Header
-from acquisition.recordings.tables.text import Text, decode, in_turn
+from acquisition.recordings.tables.text import Text, decode, joined_in_turn
 from acquisition.recordings.tables.times import clock_s, clock_times, is_newest_first, is_time_cell
 from acquisition.recordings.tables.vocabulary import LABEL
-from acquisition.units import measure_of
 
 _MONITOR = re.compile(
     r"^\[?(?:\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ]+)?(\d{1,2}:\d\d:\d\d(?:[.,]\d{1,9})?)(?:[^\S\n]*->|\])[^\S\n]*",
@@ -47,7 +47,6 @@ _MONITOR = re.compile(
 )
 _MATRIX_ROW = re.compile(rb"^[-+.,\deE \t\[]*[;\]][ \t\];]*$", re.MULTILINE)
 _BLANKED = bytes.maketrans(b"[];", b"   ")
-_QUANTITY = re.compile(r"([-+]?[\d.,]+(?:[eE][-+]?\d{1,2})?) ?([^\W\d_][^\s\d]*|°)")
 _FEWEST, _SHARE, _HEAD, _MOST_WORDS, _FEWEST_LONG, _MOST_LONG = 3, 0.8, 40, 20, 20, 5
 
 
@@ -105,6 +104,7 @@ def header(lines: Sequence[str]) -> Header | None:
     return replace(
         table,
         headings=[marked(at, each) for at, each in enumerate(headings)],
+        run="Part 1",  # if there are several
         ragged=len(values) > 1,
         traps=tuple(traps),
         clocks=tuple(clocks) if not formula and set(times) <= set(clocks) else (),
@@ -182,18 +182,9 @@ def prepared(text: Text) -> Text:
         text = Text.of(_MATRIX_ROW.sub(lambda row: row[0].translate(_BLANKED), text.data))
         head = text.head(_HEAD)
     mark = next((mark for mark in "\t;," if any(mark in line for line in head)), " ")
-    widths = [_width(line, mark) for line in head]
-    first = in_turn(widths)
-    if first is None:
-        return text
     lines = text.lines()
-    joined, at = lines[:first], first
-    while at < len(lines):
-        pair = lines[at : at + 2]
-        whole = [_width(line, mark) for line in pair] == widths[first : first + 2]
-        joined += [mark.join(line.strip() for line in pair), ""] if whole else pair[:1]
-        at += 2 if whole else 1
-    return Text.of("\n".join([*joined, ""] if text.ended else joined).encode())
+    joined = joined_in_turn(lines, lambda line: _width(line, mark), mark)
+    return text if joined is lines else Text.of("\n".join([*joined, ""] if text.ended else joined).encode())
 
 
 def _as_columns(text: Text) -> Text:
@@ -219,7 +210,7 @@ def _with_units_apart(text: Text) -> Text:
     mark = next((mark for mark in "\t;," if all(mark in line for line in head[1:])), None)
     if mark is None or len(head) < 2 * _FEWEST:
         return text
-    with_unit = [[_is_quantity(cell) for cell in line.split(mark)] for line in head[_FEWEST:]]
+    with_unit = [[is_quantity(cell.strip(' "')) for cell in line.split(mark)] for line in head[_FEWEST:]]
     apart = {at for at, kinds in enumerate(zip_longest(*with_unit, fillvalue=False)) if np.mean(kinds) >= _SHARE}
     if not apart or len(apart) == len(with_unit[0]):  # a sketch prints one distance in several units
         return text
@@ -227,15 +218,23 @@ def _with_units_apart(text: Text) -> Text:
     for line in text.lines():
         cells = line.split(mark)
         for at in sorted(apart & {*range(len(cells))}, reverse=True):
-            match = _QUANTITY.fullmatch(cells[at].strip(' "'))
-            cells[at : at + 1] = [match[1], match[2]] if match else [cells[at], ""]
+            cells[at : at + 1] = quantity(cells[at].strip(' "')) or (cells[at], "")
         lines.append(mark.join(cells))
     return Text.of("\n".join(lines).encode())
 
 
-def _is_quantity(cell: str) -> bool:
-    match = _QUANTITY.fullmatch(cell.strip(' "'))
-    return match is not None and parse_number(match[1]) is not None and measure_of(match[2]) is not None
+def _blocks(text: Text, first: Header) -> Iterator[tuple[int, Header]]:
+    """Yield where the names of a table without times come again; then each block is a run."""
+    if not first.named or first.formula is not None or any(each.role == "time" for each in first.headings):
+        return
+    names = next(line for line in reversed(text.lines(0, first.lines)) if line.strip())
+    begins, row = [], first.lines
+    while (at := text.find(f"\n{names}\n".encode(), row)) is not None:
+        begins.append((text.words_above(row, at + 1), at + 2))
+        row = at + 2
+    if begins and (row - first.lines) / len(begins) >= FEWEST_ROWS:
+        for number, (begin, rows) in enumerate(begins, 2):
+            yield begin, replace(first, lines=rows - begin, run=f"Part {number}", traps=())
 
 
 def _width(line: str, mark: str) -> int:
@@ -250,4 +249,5 @@ FORMAT = text_format(
     header,
     expected="rows of numbers, three or more alike",
     prepare=prepared,
+    blocks=_blocks,
 )

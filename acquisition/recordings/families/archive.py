@@ -9,9 +9,8 @@ from __future__ import annotations
 import io
 import zipfile
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import PurePosixPath
 
 from acquisition.errors import FormatError
@@ -30,20 +29,22 @@ _DAMAGE = (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EO
 """Exceptions that zipfile raises for damaged or encrypted files and for unknown kinds of compression."""
 
 
-def _tables_of_parts(
-    path: str, parts: Iterable[tuple[str, Callable[[], Sequence[Table]] | None]], what: str
+def tables_inside(
+    path: str, parts: Iterable[tuple[str, bytes]], what: str, but: Sequence[str] = NOT_INSIDE
 ) -> list[Table]:
-    """Return the tables of all parts of a file: each part is a run, unless there is only one.
+    """Return the tables of all parts of a file, given by name and content: each is a run, unless there is only one.
 
-    ``parts`` are the name of each part and what reads it, or None if nothing can. ``what`` is the word for a part.
+    The parts are read by their formats, but for some. ``what`` is the word for a part.
     """
+    families = [each for each in formats() if isinstance(each, ColumnFormat) and each.name not in but]
     recordings: list[tuple[str, Sequence[Table]]] = []
     unread: list[str] = []
     refusal = None
-    for name, read in parts:
+    for name, data in parts:
+        family = next((each for each in families if each.recognises(data[:HEAD_BYTES])), None)
         try:
-            if read is not None:
-                recordings.append((name, read()))
+            if family is not None:
+                recordings.append((name, family.tables(f"{path}, {what} {name}", data)))
                 continue
         except FormatError as error:
             refusal = error
@@ -115,19 +116,6 @@ def _evidence(head: bytes) -> str:
         or b"application/vnd.oasis" in head[:200]
     )
     return "it begins with the bytes of a zip archive" if head.startswith(_MAGIC) and not others else ""
-
-
-def tables_inside(
-    path: str, parts: Iterable[tuple[str, bytes]], what: str, but: Sequence[str] = NOT_INSIDE
-) -> list[Table]:
-    """Return the tables of all parts of a file, given by name and content and read by their formats but for some."""
-    families = [each for each in formats() if isinstance(each, ColumnFormat) and each.name not in but]
-
-    def reader(name: str, data: bytes) -> Callable[[], Sequence[Table]] | None:
-        family = next((each for each in families if each.recognises(data[:HEAD_BYTES])), None)
-        return None if family is None else partial(family.tables, f"{path}, {what} {name}", data)
-
-    return _tables_of_parts(path, ((name, reader(name, data)) for name, data in parts), what)
 
 
 FORMAT = ColumnFormat(

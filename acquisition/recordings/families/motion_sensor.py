@@ -24,12 +24,11 @@ from acquisition.recordings.reading import READ_DEFAULTS, ReadOptions
 from acquisition.recordings.recording import FormatIssue, Original, Recording, Survey
 from acquisition.recordings.sampling.flags import IRREGULAR, UNREAD_FLAGS, time_flags
 from acquisition.recordings.sampling.timing import median
-from acquisition.recordings.tables.channel import check_lengths, read_channel
+from acquisition.recordings.tables.channel import Samples, check_lengths, read_channel
 from acquisition.recordings.tables.format import ColumnFormat, text_format
 from acquisition.recordings.tables.headings import Heading
 from acquisition.recordings.tables.layout import columns_of, find_table, runs_forward
 from acquisition.recordings.tables.numbers import EMPTY_CELL, UNREAD_CELL, scaled
-from acquisition.recordings.tables.samples import Samples
 from acquisition.recordings.tables.table import Header, Table
 from acquisition.units import LENGTH_POWERS
 

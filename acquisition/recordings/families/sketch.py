@@ -20,7 +20,7 @@ from acquisition.recordings.tables.headings import Heading, is_time
 from acquisition.recordings.tables.layout import runs_forward
 from acquisition.recordings.tables.numbers import UNREAD_CELL
 from acquisition.recordings.tables.table import Column, Lines, Table, side_by_side
-from acquisition.recordings.tables.text import Text, in_turn, is_text, text_of
+from acquisition.recordings.tables.text import Text, is_text, joined_in_turn, text_of
 from acquisition.recordings.tables.times import CLOCK, clock_times
 
 _FEWEST, _SHARE, _MOST, _HEAD = 3, 0.6, 40, 120
@@ -46,12 +46,8 @@ def _usual(of: list[tuple[int, str]]) -> tuple[bool, LineForm] | None:
 
 def _joined(lines: list[str]) -> list[tuple[int, str]]:
     """Return lines with their numbers, but for blank ones; two kinds in turn (time, then distance) are joined."""
-    numbered = [(number, line) for number, line in enumerate(lines, 1) if line.strip()]
-    first = in_turn([_kind(numbers(line)) for _, line in numbered[:_MOST]])
-    if first is None:
-        return numbered
-    pairs = zip(numbered[first::2], numbered[first + 1 :: 2], strict=False)
-    return [(number, f"{line}\t{below}") for (number, line), (_, below) in pairs]
+    joined = joined_in_turn(lines, lambda line: _kind(numbers(line)), "\t")
+    return [(number, line) for number, line in enumerate(joined, 1) if line.strip()]
 
 
 def _kind(of_line: list[Number]) -> LineForm:

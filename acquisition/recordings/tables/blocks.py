@@ -26,7 +26,7 @@ from acquisition.recordings.tables.times import in_order, is_newest_first, out_o
 from acquisition.recordings.tables.vocabulary import ANY_VALUE, LABEL
 from acquisition.units import Measure, measure_of, time_unit
 
-_FEWEST_ROWS = 8
+FEWEST_ROWS = 8
 """Usual number of rows from which on a block is a run; times of shorter blocks begin again every few rows."""
 _MOST_LABELS, _SHARE_OF_CHANGES = 20, 0.1
 _NEAR = 3  # rows before and after a step back that must lie on its two sides
@@ -48,7 +48,7 @@ def runs_of(table: Table) -> list[Table]:
         order = _sorted(t)
         return [_with_times(_taken(table, order), t[order], "rows were out of place and were sorted")]
     begins = _begins(t)
-    if not begins or median(np.diff([0, *begins, size])) < _FEWEST_ROWS:
+    if not begins or median(np.diff([0, *begins, size])) < FEWEST_ROWS:
         return [table]
     parts = [_taken(table, rows) for rows in _blocks(table.lines, [0, *begins, size])]
     return [
@@ -145,7 +145,7 @@ def _by_label(table: Table) -> list[Table]:
         if column.words is None or table.lines is None or not table.columns:
             continue
         labels, counts = np.unique(column.words[column.words != ""], return_counts=True)
-        if not 2 <= labels.size <= _MOST_LABELS or counts.min() < _FEWEST_ROWS or not _tells_apart(table, column):
+        if not 2 <= labels.size <= _MOST_LABELS or counts.min() < FEWEST_ROWS or not _tells_apart(table, column):
             continue
         tables = []
         for label in labels.tolist():

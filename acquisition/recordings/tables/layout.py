@@ -13,7 +13,7 @@ from acquisition.block import F8
 from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.sampling.timing import Formula
 from acquisition.recordings.tables.headings import Heading, heading_of, is_time, is_uncertainty, split_heading
-from acquisition.recordings.tables.numbers import THOUSANDS, is_lost, parse_number
+from acquisition.recordings.tables.numbers import THOUSANDS, is_lost, is_quantity, parse_number
 from acquisition.recordings.tables.numbers import cell as number_form
 from acquisition.recordings.tables.table import Header
 from acquisition.recordings.tables.times import in_order, is_newest_first, is_time_cell
@@ -30,7 +30,6 @@ _SETTING = re.compile(r"[=]|:(?!\s*$)")
 _LONGEST_NAME = 5  # maximum number of words
 _BRACKETED = re.compile(r"\([^()]*\)|\[[^\[\]]*\]")
 _TOKEN = re.compile(r"[^\s(\[]+(?:\s*[(\[][^)\]]*[)\]])?")
-_QUANTITY = re.compile(r"[-+]?\d+(?:[.,]\d*)? ?([^\W\d_]+)")  # 26.9 cm, as sketches print it
 _SEP = re.compile(r"[\ufeff\"]*sep=(.)")  # a line of Excel
 _FIRST_NUMBERS = 10  # row numbers begin below this; the first may be missing, in rows unlike the others
 _NONE = ("", "lost")
@@ -141,8 +140,8 @@ def _kind(cell: str) -> str:
         return "number"
     if is_lost(cell):
         return "lost"
-    if (quantity := _QUANTITY.fullmatch(cell)) and measure_of(quantity[1]) is not None:
-        return "mixed"
+    if is_quantity(cell):
+        return "mixed"  # 26.9 cm, as sketches print it
     if is_time_cell(cell):
         return "clock"
     if _DATE.fullmatch(cell):

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from acquisition.block import B1, F8
 from acquisition.recordings.tables.vocabulary import LOST
+from acquisition.units import measure_of
 
 I1 = NDArray[np.int8]
 NAN_CELL, EMPTY_CELL, UNREAD_CELL = -1, -2, -3
@@ -33,6 +34,7 @@ _CELL = re.compile(r"([+-]?(?:\d+[.,]?(\d*)|[.,](\d+)))(?:[eEdD]([+-]?\d{1,3}))?
 _ACCOUNTED = re.compile(r"\((\d[\d.,]*)\)|(\d[\d.,]*)-", re.ASCII)
 _NAN = re.compile(r"[+-]?nan", re.IGNORECASE)
 _LOST = re.compile(r"[-+±>]?∞|[-–—−]+|…|\*+|\?+|\.{2,}")
+_QUANTITY = re.compile(r"([-+]?[\d.,]+(?:[eE][-+]?\d{1,2})?)[ \xa0]?([^\W\d_][^\s\d]*|°)")
 _OVERLOAD = 9e36
 _MINUS = re.compile(
     r"(?:(?<![^\W_])|(?<=\d[eE^]))[\u2212\u2013\ufe63\uff0d](?=[.,\u066b]?[\d∞])|(?<=\d)[\u2212\u2013](?=[\s;]|$)"
@@ -87,6 +89,18 @@ def cell(text: str) -> tuple[float, int]:
 def is_lost(text: str) -> bool:
     """Return whether a cell is a word or sign that stands in place of a number."""
     return text.lower().lstrip("+-><") in LOST or bool(_LOST.fullmatch(text))
+
+
+def quantity(text: str) -> tuple[str, str] | None:
+    """Return the number and the word of a cell that has both, as ``26.9 cm``; None for any other text."""
+    match = _QUANTITY.fullmatch(text)
+    return (match[1], match[2]) if match is not None and parse_number(match[1]) is not None else None
+
+
+def is_quantity(text: str) -> bool:
+    """Return whether a cell has a number and a unit that a channel may have."""
+    pair = quantity(text)
+    return pair is not None and measure_of(pair[1]) is not None
 
 
 def parse_number(text: str) -> float | None:

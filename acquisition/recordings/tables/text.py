@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import codecs
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -123,13 +123,25 @@ def restated(path: str, data: bytes, delimiter: str | None, decimal: str | None)
     return "\n".join(lines).encode()
 
 
-def in_turn(kinds: Sequence[object]) -> int | None:
-    """Return the first of lines of two kinds that come in turn, given the kinds of lines (false for no row)."""
-    first = next((at for at, kind in enumerate(kinds) if kind), 0)
+def joined_in_turn(lines: list[str], kind: Callable[[str], object], mark: str) -> list[str]:
+    """Return lines of which two kinds come in turn, time and then distance, joined: the second of each becomes blank.
+
+    ``kind`` gives the kind of a line, false for no row.
+    """
+    rows = [at for at, line in enumerate(lines) if line.strip()]
+    kinds = [kind(lines[at]) for at in rows[: 4 * _TURNS]]
+    first = next((at for at, each in enumerate(kinds) if each), 0)
     odd, even = kinds[first : first + 2 * _TURNS : 2], kinds[first + 1 : first + 2 * _TURNS : 2]
-    if len(even) < _TURNS or len({*odd}) > 1 or len({*even}) > 1:
-        return None
-    return first if even[0] and odd[0] != even[0] else None
+    if len(even) < _TURNS or len({*odd}) > 1 or len({*even}) > 1 or not even[0] or odd[0] == even[0]:
+        return lines
+    joined, at = list(lines), first
+    while at + 1 < len(rows):
+        upper, lower = rows[at : at + 2]
+        at += 1
+        if (kind(lines[upper]), kind(lines[lower])) == (odd[0], even[0]):
+            joined[upper], joined[lower] = f"{lines[upper].strip()}{mark}{lines[lower].strip()}", ""
+            at += 1
+    return joined
 
 
 def text_of(path: str, data: bytes) -> Text:

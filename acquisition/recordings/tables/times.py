@@ -24,7 +24,7 @@ import numpy as np
 
 from acquisition.block import F8
 from acquisition.recordings.sampling.timing import median
-from acquisition.recordings.tables.numbers import EXPONENT, I1, UNREAD_CELL, parse_number
+from acquisition.recordings.tables.numbers import EXPONENT, I1, UNREAD_CELL, quantity
 from acquisition.recordings.tables.numbers import cell as number_of
 from acquisition.recordings.tables.vocabulary import AM, MONTHS, PM
 from acquisition.units import time_unit
@@ -60,7 +60,6 @@ _DURATION = re.compile(
     r"(?:(?P<h>\d+):(?P<m>\d\d):(?P<s>\d\d(?:[.,]\d+)?)"
     r"|p?t?(?:(?P<h2>\d+) ?h(?:\w+)? ?)?(?:(?P<m2>\d+) ?m(?:in\w*)? ?)?(?:(?P<s2>\d+(?:[.,]\d+)?) ?s(?:\w+)?)?)"
 )
-_WITH_UNIT = re.compile(r"([-+]?[\d.,]+(?:e[-+]?\d{1,2})?)[ \xa0]?([^\W\d_]+)", re.IGNORECASE)
 _WRAPS = (
     *(float(power) * unit for unit in (1.0, 1e-3, 1e-6) for power in (1 << 16, 1 << 31, 1 << 32)),
     *(60.0, 3600.0, _DAY_S / 2, _DAY_S),
@@ -145,9 +144,9 @@ def _month(word: str) -> int:
 
 def duration_s(cell: str) -> tuple[float, int] | None:
     """Return a duration in seconds and its decimals: ``0 days 00:00:00.010``, ``PT0.01S``, ``1 min 2 s``, ``10 ms``."""
-    match = _WITH_UNIT.fullmatch(cell)
-    if match is not None and parse_number(match[1]) is not None and (unit := time_unit(match[2])) is not None:
-        number, decimals = number_of(match[1])
+    pair = quantity(cell)
+    if pair is not None and (unit := time_unit(pair[1])) is not None:
+        number, decimals = number_of(pair[0])
         places = max(
             0, decimals % EXPONENT - unit.power - (0 if unit.factor == 1.0 else round(math.log10(unit.factor)))
         )

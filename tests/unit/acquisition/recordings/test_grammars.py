@@ -236,6 +236,21 @@ def test_a_clock_that_starts_again_begins_another_run(tmp_path: Path, parts: int
         assert not recording.malformed_rows
 
 
+@pytest.mark.parametrize("head", ["Position (cm)\n", "Force,Position\n(N),(cm)\n"])
+def test_a_heading_that_comes_again_without_times_begins_another_run(tmp_path: Path, head: str) -> None:
+    """The rows of each part are those between its heading and the next."""
+    parts = [X, 2 * X[:40], 3 * X[:50]]
+    rows = ("\n".join(f"{9 * x:.3f},{x:.4f}" if "," in head else f"{x:.4f}" for x in part) for part in parts)
+    text = "\n\n".join(head + part for part in rows) + "\n"
+    with pytest.raises(NeedsAnswer) as asked:
+        read(tmp_path, text, channel="Position")
+    assert len(asked.value.question.needs[0].choices) == len(parts)
+    for number, part in enumerate(parts, 1):
+        recording = read(tmp_path, text, channel="Position", run=f"{number}", rate_hz=20.0)
+        holds(recording, T[: part.size], part)
+        assert not recording.malformed_rows
+
+
 def test_a_column_of_times_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     """The answer does not invite a rate that nobody measured; a stated rate is taken."""
     text = table([f"tick {t:.2f}!" for t in T], [f"{x:.3f}" for x in X], head="Time;Position (cm)")
