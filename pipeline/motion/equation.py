@@ -23,7 +23,7 @@ from pipeline.dynamics.equation import Equation, Problem, Real
 from pipeline.dynamics.integrator import Trajectory
 from pipeline.dynamics.strang import STRANG
 from pipeline.modes.mode import Modes
-from pipeline.motion.fit import Rows, clipped, fit
+from pipeline.motion.fit import Rows, allowed, clipped, fit
 from pipeline.motion.fitted import Oscillation, Phase, Refusal, RestPosition, Waveform, wrapped
 from pipeline.motion.relaxation import LEAST_DAMPING
 from pipeline.numerics.estimate import Estimate
@@ -216,16 +216,16 @@ def fit_equation(
     models = [Solved(law, motion) for law in laws]
     # An average of samples has less noise between neighbours than about a sinusoid, which in turn errs where damping is
     # strongest: the quarter of the windows that it fits best shows the noise.
-    every, scatter = rows, max(expected, float(np.quantile(windows.noises, 0.25)))
+    every, most = rows, allowed(expected, float(np.quantile(windows.noises, 0.25)))
     for starts in (_by_amplitude(models, windows, damping), _by_first_samples(models, rows, windows.angular_frequency)):
         start = _nearest(models[-1], every, starts)
         found, rows = clipped(models[-1], every, start[models[-1].slots], least=expected, rounds=3)
         left, count = rows.left(models[-1], found.values)[rows.used], found.values.size
         noise = math.sqrt(float(left @ left) / (left.size - count)) if left.size > count else math.inf
-        if noise <= MISFIT * scatter:
+        if noise <= most:
             break
     else:
-        return Refusal("misfit", {**numbers, "rms_m": noise, "noise_m": scatter})
+        return Refusal("misfit", {**numbers, "rms_m": noise, "noise_m": most / MISFIT})
     noise = max(noise, 0.01 * expected)
     correlation, rows = correlation_length(left), replace(rows, u=noise)
     chosen = _chosen(models, rows, found.values, correlation, damping, samples.track.unit)
@@ -445,7 +445,6 @@ def _described(
         t0=t0,
         angular_frequency=Estimate(omega, u_omega, "rad/s"),
         phase=Estimate(wrapped(start), u_phase, "rad"),
-        backbone=None,
         reduced_chi2=best.reduced_chi2,
         correlation=damping.scatter.correlation,
         residual=windows.phase - centre - omega * (t - middle),

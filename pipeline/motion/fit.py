@@ -27,6 +27,19 @@ from pipeline.windows.demodulate import CLIP_SIGMAS
 FEW_CHANGES = 1e-4
 
 
+# Maximum ratio of the noise to that of the fourth differences of neighbours: for a mean of k samples it is
+# sqrt(7 k / 4), as follows from their coefficients; here k is 8.
+SMOOTHED = math.sqrt(14.0)
+
+
+def allowed(noise: float, scatter: float) -> float:
+    """Return the largest residual that is no misfit, from the noise of neighbours and the scatter about a free curve.
+
+    Neighbours differ by less than the noise if the sensor averages its samples, but not by any factor.
+    """
+    return MISFIT * min(max(noise, scatter), SMOOTHED * noise)
+
+
 class Model(Protocol):
     """A motion with parameters."""
 

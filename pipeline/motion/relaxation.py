@@ -17,11 +17,11 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.motion.fit import Rows
+from pipeline.motion.fit import Rows, allowed
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.least_squares import CENTRAL_STEP, Fit
-from pipeline.numerics.levels import FEWEST_FOR_CURVE, MISFIT, STRONG, VERY_STRONG
+from pipeline.numerics.levels import FEWEST_FOR_CURVE, STRONG, VERY_STRONG
 from pipeline.numerics.regression import correlation_length, covariance_of
 from pipeline.samples.condition import Samples
 from pipeline.track import F8, U8, Quality
@@ -323,9 +323,9 @@ def _follow(t: F8, y: F8, noise: float, samples: Samples) -> Relaxation | NoOsci
 
 def _misses(rows: Rows, found: Decay) -> bool:
     """Return whether the residual is too large over the whole record or over its moving part."""
-    squares = (rows.left(DAMPED, found.values) / max(rows.u, _scatter(rows, found))) ** 2
+    squares = rows.left(DAMPED, found.values) ** 2
     count = max(int(np.searchsorted(rows.t, 4.0 / found.slowest)), 12)
-    return bool(max(float(np.mean(squares)), float(np.mean(squares[:count]))) > MISFIT**2)
+    return max(float(np.mean(squares)), float(np.mean(squares[:count]))) > allowed(rows.u, _scatter(rows, found)) ** 2
 
 
 def _scatter(rows: Rows, found: Decay) -> float:
