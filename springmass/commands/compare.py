@@ -25,7 +25,7 @@ from springmass.commands.options import (
     Strict,
 )
 from springmass.commands.parameters import Share, argument, option, output
-from springmass.comparing.comparison import SpringComparison, compare_runs, comparison_json, line_and_hooke_words
+from springmass.comparing.comparison import SpringComparison, compare_runs, comparison_json, comparison_words
 from springmass.course.results_csv import COURSE, is_course, read_rows
 from springmass.errors import HINT, LOG, OK, REJECTED, ProgramError
 from springmass.loading.save import now_utc
@@ -139,7 +139,7 @@ def _print_text(compared: SpringComparison, runs: list[Run]) -> None:
 
     text = comparison_text(compared.comparison, [run.analysis for run in runs], style_of(sys.stdout))
     print(*law_lines(runs), text, sep="\n")
-    for message in (*line_and_hooke_words(compared), *(joint.message for joint in compared.joint)):
+    for message in (*comparison_words(compared), *(joint.message for joint in compared.joint)):
         print(f"\n{wrapped(message)}")
     if compared.reported:
         mistakes = [plain(f) for f in compared.findings if "reported" in kinds()[f.code].about]

@@ -95,7 +95,7 @@ def _in_folder(
             f"{folder}: cannot read the folder ({error.strerror})", "name another", UNREADABLE
         ) from error
     names = {path.name for path in files}
-    pairs = {path.name: name for path in files if (name := velocity_name(path)) in names}
+    pairs = {path.name: name for path in files if (name := _velocity_of(path)) in names}
     made = {path.name for path in files if path.suffix == ".wire" and f"{path.stem}.h5" in names}
     parts = made.union(pairs.values())
     taken = [
@@ -109,7 +109,7 @@ def _in_folder(
     )
 
 
-def velocity_name(path: Path) -> str | None:
+def _velocity_of(path: Path) -> str | None:
     """Return the name of the velocity file that would belong to a position file; None for any other."""
     stem = path.stem.removesuffix("_position")
     return None if stem == path.stem else f"{stem}_velocity{path.suffix}"

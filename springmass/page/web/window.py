@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import inspect
 import json
 import socket
 from collections.abc import AsyncIterator, Callable, Mapping
@@ -27,7 +28,28 @@ DESERTED_S, FIRST_S = 60.0, 600.0
 LONGEST_REQUEST = 1 << 18
 OWN_HEADER = ("x-springmass", "window")
 """A header that no page of another origin can send without being asked first, and the answer to that is no."""
-TAKEN = {"results.csv": "report/results.csv", "table.tex": "report/table.tex", "results.json": "report/results.json"}
+TAKEN = {name: f"report/{name}" for name in ("results.csv", "table.tex", "results.json")} | {
+    name: name for name in ("figures.zip", "run.h5")
+}
+SHOWN = {"shown": "results.json", "report": "report/report.html"}
+"""The files of a card that a page may load or show, by the end of their address."""
+ACTIONS: Mapping[str, Callable[[Cards, str, Mapping[str, Any]], Any]] = {
+    "open": lambda cards, card, asked: cards.open_drop(asked["drop"], card),
+    "examples": lambda cards, *_: cards.examples(sample_data()),
+    "change": lambda cards, card, asked: cards.change(card, asked["changes"]),
+    "separate": lambda cards, card, _: cards.separate(card),
+    "stop": lambda cards, card, _: cards.stop(card),
+    "remove": lambda cards, card, _: cards.remove(card),
+    "write": lambda cards, card, asked: cards.write(card, str(asked["what"])),
+    "judge": lambda cards, card, asked: cards.judge(card, asked["rows"]),
+    "compare": lambda cards, _, asked: cards.compare(asked),
+    "ports": lambda *_: ports(),
+    "record": lambda cards, _, asked: cards.record(asked),
+    "end": lambda cards, *_: cards.recorder.end(),
+    "restore": lambda cards, _, asked: cards.restore(asked["window"], forget=False),
+    "forget": lambda cards, _, asked: cards.restore(asked["window"], forget=True),
+}
+"""What a page may ask, with the card that it is about and the whole request."""
 
 
 class Window:
@@ -38,38 +60,15 @@ class Window:
         self.quiet_s = DESERTED_S - FIRST_S
 
     async def do(self, asked: Mapping[str, Any]) -> Response:
-        """Carry out what a page asks."""
-        cards, card = self._cards, str(asked.get("card", ""))
-        match asked.get("do"):
-            case "open":
-                await cards.open_drop(str(asked["drop"]), card)
-            case "examples":
-                await cards.examples(sample_data())
-            case "change":
-                cards.change(card, asked["changes"])
-            case "separate":
-                cards.separate(card)
-            case "stop":
-                cards.stop(card)
-            case "remove":
-                cards.remove(card)
-            case "write":
-                await cards.write(card, str(asked["what"]))
-            case "judge":
-                return JSONResponse(await cards.judge(card, asked["rows"]))
-            case "compare":
-                return FileResponse(await cards.compare(asked), media_type="application/json")
-            case "ports":
-                return JSONResponse(await ports())
-            case "record":
-                cards.record(asked)
-            case "end":
-                cards.recorder.end()
-            case "restore" | "forget":
-                cards.restore(str(asked["window"]), forget=asked["do"] == "forget")
-            case _:
-                raise NotTaken("the window does no such thing")
-        return JSONResponse({})
+        """Carry out what a page asks, and answer with the file that was made, or with what was found."""
+        act = ACTIONS.get(str(asked.get("do")))
+        if act is None:
+            raise NotTaken("the window does no such thing")
+        done = act(self._cards, str(asked.get("card", "")), asked)
+        found = await done if inspect.isawaitable(done) else done
+        return (
+            FileResponse(found, media_type="application/json") if isinstance(found, Path) else JSONResponse(found or {})
+        )
 
     async def attend(self, browser: WebSocket) -> None:
         """Send a page everything, and then what changes; it is gone when its connection closes."""
@@ -88,11 +87,11 @@ class Window:
     async def _send(self, browser: WebSocket) -> None:
         revision = -1
         while True:
-            turned, messages = self._cards.turned(), self._cards.since(revision)
+            turned, messages = self._cards.turned, self._cards.since(revision)
             revision = self._cards.revision
             for message in messages:
                 await browser.send_text(json.dumps(message))
-            await turned
+            await turned.wait()
 
     async def reading(self, over: Callable[[], None]) -> None:
         """Call ``over`` once no page has been there for a while and nothing is recorded."""
@@ -149,21 +148,13 @@ def application(window: Window, cards: Cards, life: Callable[[Starlette], Any]) 
         except NotTaken as error:
             return PlainTextResponse(f"springmass: {error}\n", 404)
         what = request.path_params["what"]
-        files = {
-            "shown": "results.json",
-            "report": "report/report.html",
-            "figures.zip": "figures.zip",
-            "run.h5": "run.h5",
-        }
-        path = card.folder / (files | TAKEN).get(what, "nothing")
+        path = card.folder / (TAKEN | SHOWN).get(what, "nothing")
         if not path.is_file():
             return PlainTextResponse("springmass: this has not been made yet\n", 404)
-        if what in ("shown", "report"):
-            return FileResponse(path, media_type="application/json" if what == "shown" else "text/html")
-        return FileResponse(
-            path,
-            filename=f"{Path(card.kept['name']).stem}{'.' if what == 'run.h5' else '-'}{what.removeprefix('run.')}",
-        )
+        if what in SHOWN:
+            return FileResponse(path)
+        stem, end = Path(card.kept["name"]).stem, what.replace("run.", ".") if what == "run.h5" else f"-{what}"
+        return FileResponse(path, filename=f"{stem}{end}")
 
     routes = [
         Route("/", main),

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import json
 import os
+import re
 import secrets
 import shutil
 import time
@@ -18,7 +19,6 @@ from platformdirs import user_state_path
 from acquisition.units import MEASURES, TIMES
 from pipeline.damping.laws import LAWS, words_of
 from springmass.errors import ProgramError
-from springmass.loading.inputs import velocity_name
 from springmass.page.window.processes import Children, ProcessEnded
 from springmass.page.window.recording import RecorderProcess
 from springmass.result.output_names import plain_name
@@ -30,18 +30,8 @@ ALIVE_S = 60.0
 """A window whose folder was not touched for so long has ended; it touches it every second."""
 LONGEST_NOTE = 4000
 TOO_MUCH = "Unpacked, this archive would exceed 1 GB or 200 files together"
-BLANK: Mapping[str, Any] = {
-    "velocity": None,
-    "answers": {},
-    "bench": {},
-    "scene": None,
-    "notes": "",
-    "from_s": None,
-    "to_s": None,
-    "law": None,
-    "accuracy": None,
-    "saved": False,
-}
+_UNSET = dict.fromkeys(("velocity", "scene", "from_s", "to_s", "law", "accuracy"))
+BLANK: Mapping[str, Any] = {**_UNSET, "answers": {}, "bench": {}, "notes": "", "saved": False}
 """What is kept of a card besides its name and its file."""
 
 
@@ -80,7 +70,7 @@ class Card:
 
 
 class Cards:
-    """All cards of this window, in a folder that only its user may open."""
+    """All cards of this window, in a folder that only its user may open; ``turned`` is set at the next change."""
 
     def __init__(self, top: Path | None = None) -> None:
         self._top = (top or user_state_path("springmass", appauthor=False)) / "window"
@@ -94,7 +84,7 @@ class Cards:
         self.revision = 0
         self._drops: dict[tuple[str, str], Path] = {}
         self._tasks: set[asyncio.Task[None]] = set()
-        self._turned = asyncio.Event()
+        self.turned = asyncio.Event()
         self.recorder = RecorderProcess(self._top)
         self._recorder = self.recorder.message()
 
@@ -202,14 +192,13 @@ class Cards:
         scenes = [path for place in places for path in place.glob("*.toml") if not _is_note(path)]
         if len(scenes) > 1:
             raise NotTaken(f"{len(scenes)} scenes were dropped and none is used; drop one of them on its recording")
-        if scenes:
-            await self.use_scene(scenes[0], [on] if on in self.cards else added or [*self.cards])
+        for card in ([on] if on in self.cards else added or [*self.cards]) if scenes else ():
+            self.change(card, {"scene": await self._scene_of(scenes[0]), "bench": {}})
 
-    async def use_scene(self, path: Path, cards: Sequence[str]) -> None:
-        """Use a scene file as the bench of cards."""
+    async def _scene_of(self, path: Path) -> dict[str, Any]:
+        """Return the tables of a scene file."""
         answer = await self.ask("scene", {"do": "scene", "path": str(path)}, path.stat().st_size)
-        for card in cards:
-            self.change(card, {"scene": answer["scene"], "bench": {}})
+        return dict(answer["scene"])
 
     def open_paths(self, paths: Iterable[str | Path], stated: Mapping[str, Any]) -> None:
         """Open files where they lie, as the command line names them, with what it states of them."""
@@ -221,8 +210,8 @@ class Cards:
         """Open the bundled recordings, each with its scene."""
         for name in ("undamped", "damped"):
             position, velocity = (str(folder / f"{name}_simulated_{what}.txt") for what in ("position", "velocity"))
-            card = self._add({"name": f"Example: {name}", "path": position, "velocity": velocity})
-            await self.use_scene(folder / f"{name}.scene.toml", [card.id])
+            scene = await self._scene_of(folder / f"{name}.scene.toml")
+            self._add({"name": f"Example: {name}", "path": position, "velocity": velocity, "scene": scene})
 
     def _add(self, kept: Mapping[str, Any]) -> Card:
         if len(self.cards) >= MOST_FILES:
@@ -277,15 +266,14 @@ class Cards:
         shutil.rmtree(card.folder, ignore_errors=True)
         self._change()
 
-    async def write(self, wanted: str, what: str) -> Path:
-        """Write what a person takes away; return its file or folder."""
+    async def write(self, wanted: str, what: str) -> None:
+        """Write what a person takes away."""
         card = self.card(wanted)
         await self.ask(card.id, {"do": "write", "what": what, "card": card.kept, "into": str(card.folder)}, card.size)
         if what == "run":
             card.kept["saved"] = True
             card.keep()
             self._change(card)
-        return card.folder
 
     async def judge(self, wanted: str, rows: Sequence[Sequence[str]]) -> dict[str, Any]:
         """Return the verdicts on the values that a report states."""
@@ -325,7 +313,7 @@ class Cards:
     async def _work(self, card: Card) -> None:
         """Show a card until nothing on it has changed since."""
         done = 0
-        while done != card.wanted:
+        while done != card.wanted and card.id in self.cards:
             done = card.wanted
             self._say(card, stage="waiting", problem="")
             into = card.folder / "results.json"
@@ -341,6 +329,8 @@ class Cards:
 
     async def _take(self, card: Card, answer: dict[str, Any]) -> None:
         """Take one answer of the process that shows a card."""
+        if card.id not in self.cards:
+            return
         if "inside" in answer:
             self._say(card, **answer)
             if min(self._room()) < 0:
@@ -357,6 +347,10 @@ class Cards:
             card.kept["asked"] = [*fields.values()]
             card.keep()
             self._say(card, stage="question", question=answer["question"])
+        elif "problem" in answer and card.kept["velocity"]:  # no pair of one format: two recordings
+            self._add(*_of_files([Path(card.kept["velocity"])]))
+            card.kept["velocity"] = None
+            self._want(card)
         elif "problem" in answer:
             self._say(card, stage="failed", problem=_joined(answer))
         else:
@@ -387,8 +381,8 @@ class Cards:
         self.revision += 1
         if card is not None:
             card.revision = self.revision
-        self._turned.set()
-        self._turned = asyncio.Event()
+        self.turned.set()
+        self.turned = asyncio.Event()
 
     def since(self, revision: int) -> list[dict[str, Any]]:
         """Return the messages for a page that has seen everything up to a revision."""
@@ -396,10 +390,6 @@ class Cards:
         known = {"laws": laws, "units": [*MEASURES], "times": [*TIMES]}
         order = {"type": "cards", "order": [*self.cards], "earlier": self.earlier, **known}
         return [order, self._recorder, *(card.message() for card in self.cards.values() if card.revision > revision)]
-
-    async def turned(self) -> None:
-        """Wait for a change."""
-        await self._turned.wait()
 
 
 def _is_note(path: Path) -> bool:
@@ -414,13 +404,16 @@ def _recordings(folder: Path) -> Iterator[dict[str, Any]]:
 
 def _of_files(paths: Iterable[Path]) -> Iterator[dict[str, Any]]:
     """Yield a card's name and files, with the velocity file of a position file; no file is opened here."""
-    files = {path: velocity_name(path) for path in paths if not path.is_dir()}
-    velocities = {path.with_name(name) for path, name in files.items() if name}
-    for path, name in files.items():
+    files = {path: path.with_name(_of_velocity(path.name)) for path in paths if not path.is_dir()}
+    pairs = {path: other for path, other in files.items() if other != path and other in files}
+    for path in files:
         made = path.suffix == ".wire" and path.with_suffix(".h5") in files
-        if path not in velocities and not made:
-            velocity = path.with_name(name) if name else None
-            yield {"name": path.name, "path": str(path), "velocity": str(velocity) if velocity in files else None}
+        if path not in pairs.values() and not made:
+            yield {"name": path.name, "path": str(path), "velocity": str(pairs[path]) if path in pairs else None}
+
+
+def _of_velocity(name: str) -> str:
+    return re.sub("([Pp])osition", lambda found: "velocity" if found[1] == "p" else "Velocity", name)
 
 
 def _joined(answer: Mapping[str, Any]) -> str:
