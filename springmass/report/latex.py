@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 
-BESIDE = 2  # columns of runs that fit the text width of LaTeX's class article
+IN_TABLE = 2  # columns of runs that fit the text width of LaTeX's class article
 
 
 def table_tex(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
     """Return Table 1 as LaTeX tables of siunitx quantities for two runs each; they need booktabs and siunitx."""
-    blocks = (slice(first, first + BESIDE) for first in range(0, len(names), BESIDE))
+    blocks = (slice(first, first + IN_TABLE) for first in range(0, len(names), IN_TABLE))
     return "\n".join(
         _filled("table.tex.j2", names=names[some], rows=table_rows(analyses[some]), number=number)
         for number, some in enumerate(blocks, 1)
