@@ -70,9 +70,9 @@ def doubted_by(finding: Finding) -> frozenset[str]:
     """Return the parts of the model that a finding doubts; an error doubts all of them unless it names some."""
     kind = kinds()[finding.code]
     small = any(abs(finding.values.get(name, 0.0)) <= size for name, size in kind.doubts_above.items())
-    if finding.severity == "info" or small:
+    if finding.severity == "info":
         return frozenset()
-    named = kind.doubts or ("everything",) * (finding.severity == "error")
+    named = kind.doubts_anyway if small else kind.doubts or ("everything",) * (finding.severity == "error")
     return frozenset(MODEL_PARTS if "everything" in named else named)
 
 
