@@ -81,6 +81,10 @@ class Text:
         at = self.data.find(what, self.starts[first])
         return None if at < 0 else self.at(at)
 
+    def matching(self, pattern: re.Pattern[bytes], first: int) -> Iterator[int]:
+        """Yield the lines from line ``first`` on in which a pattern matches."""
+        yield from (self.at(match.start()) for match in pattern.finditer(self.data, self.starts[first]))
+
     def at(self, position: int) -> int:
         """Return the line of a byte."""
         return int(np.searchsorted(self.starts, position, side="right")) - 1
