@@ -21,7 +21,7 @@ from pipeline.motion.fit import Rows, allowed
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.least_squares import CENTRAL_STEP, Fit
-from pipeline.numerics.levels import FEWEST_FOR_CURVE, STRONG, VERY_STRONG
+from pipeline.numerics.levels import FEWEST_FOR_CURVE, NEGLIGIBLE, STRONG, VERY_STRONG
 from pipeline.numerics.regression import correlation_length, covariance_of
 from pipeline.samples.condition import Samples
 from pipeline.track import F8, U8, Quality
@@ -280,12 +280,17 @@ def _moves(y: F8, noise: float) -> bool:
 
 
 def _starts(y: F8, noise: float) -> Iterator[int]:
-    """Yield the rows at which the motion may begin: the first sample, then the release of a held displacement."""
+    """Yield the rows at which the motion may begin: the first sample, then the release of a held displacement.
+
+    A bob that before that comes nearer to rest than half of the displacement swings, and moves freely from the first
+    sample.
+    """
     yield 0
-    rest = float(np.median(y[-max(y.size // 10, 5) :]))
-    away = np.abs(y - rest)
-    held = np.flatnonzero(away >= float(np.median(away[: max(y.size // 50, 5)])) - 3.0 * noise)
-    if held.size and 5 < held[-1] < y.size - 20:
+    away = y - float(np.median(y[-max(y.size // 10, 5) :]))
+    level = float(np.median(away[: max(y.size // 50, 5)]))
+    away = away * math.copysign(1.0, level)
+    held = np.flatnonzero(away >= abs(level) - 3.0 * noise)
+    if held.size and 5 < held[-1] < y.size - 20 and np.mean(away[: held[-1]] < 0.5 * abs(level)) < NEGLIGIBLE:
         yield int(held[-1])
 
 
