@@ -11,6 +11,7 @@ from acquisition.errors import visible
 from pipeline.damping.law_fit import LawFit
 from pipeline.damping.select import Damping
 from pipeline.numerics.estimate import Estimate, UpperLimit
+from pipeline.several.joint import JointDamping
 
 
 class _Written(NamedTuple):
@@ -142,16 +143,17 @@ def rejection_of(fit: LawFit) -> str:
     return f"rejected: {reasons[fit.rejection]}"
 
 
-def law_status(damping: Damping, name: str) -> str:
-    """Return the status of a law in a few words, and why it is rejected."""
+def law_status(damping: Damping | JointDamping, name: str) -> str:
+    """Return the status of a law of one run or of several in a few words, and why it is rejected."""
     fit = damping.fits[name]
     if name == damping.selected:
-        if damping.by_statement:
+        if isinstance(damping, Damping) and damping.by_statement:
             return f"stated, and {rejection_of(fit)}" if fit.rejected else "stated"
         return f"{rejection_of(fit)}, yet the least bad" if fit.rejected else "selected"
     if fit.rejected:
         return rejection_of(fit)
-    return "admissible" if name in damping.possible else "unlikely"
+    possible = damping.possible if isinstance(damping, Damping) else damping.admissible
+    return "admissible" if name in possible else "unlikely"
 
 
 def cells(estimate: Estimate | None) -> str:
