@@ -11,7 +11,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Locator, Page
 
-from tests.pages.bench import LIMIT_S, SEEN
+from tests.pages.bench import LIMIT_S, SEEN, press
 from tests.pages.conftest import started, watched
 from tests.pages.window import MASS_G, excel, pair, phyphox, tracker
 from tests.sampling import sampled
@@ -240,16 +240,13 @@ def test_a_recording_from_the_window_becomes_a_card(window: Page, tmp_path: Path
     with window.context.expect_page() as opening:
         window.get_by_role("button", name="Start the recorder").click()
     live = opening.value
-    live.wait_for_selector("#record:not([hidden])")
-    live.keyboard.press("r")
+    press(live, "r")
+    live.wait_for_selector("#stop:not([hidden])")
     live.wait_for_function(SEEN.format(count=400))
-    live.keyboard.press("s")
-    live.wait_for_selector("#ask[open]")
-    live.keyboard.press("Enter")
-    live.wait_for_selector("#close:not([hidden])")
-    live.keyboard.press("q")
-    live.wait_for_selector("#ask[open]")
-    live.keyboard.press("Enter")
+    for key in "sq":
+        press(live, key)
+        live.wait_for_selector("#ask[open]")
+        live.keyboard.press("Enter")
     card = window.get_by_role("region", name="first-try.h5")
     card.get_by_text("simulated, not measured").wait_for()
     assert row_of(card, "period").startswith("0.757")
