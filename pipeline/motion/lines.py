@@ -225,12 +225,13 @@ def find_apart(samples: Samples) -> Apart | None:
     first = float(omega[np.argmax(power)])
     for second in (record.strongest(record.less(record.linear((first, 0.0)))), *_above(record, first, omega, power)):
         start = record.linear((first, 0.0), (second, 0.0))
-        near = abs(second - first) * record.seconds < APART * math.tau
-        if near or np.hypot(*start[5:7]) < 0.5 * NEGLIGIBLE * np.hypot(*start[1:3]):
+        if _near(record, first, second) or np.hypot(*start[5:7]) < 0.5 * NEGLIGIBLE * np.hypot(*start[1:3]):
             continue
         lines = record.fitted(start)
+        if lines is None or _near(record, *lines.omegas):  # also where the fit drew them together
+            continue
         # What the two leave beyond the noise must be below a tenth of what they describe.
-        if lines is None or lines.left > min(NEGLIGIBLE**2 + (samples.noise / record.scale) ** 2, NEGLIGIBLE):
+        if lines.left > min(NEGLIGIBLE**2 + (samples.noise / record.scale) ** 2, NEGLIGIBLE):
             continue
         for number in (0, 1):
             if (cause := _cause(lines, number)) is not None:
@@ -239,6 +240,10 @@ def find_apart(samples: Samples) -> Apart | None:
                 size, hz = record.scale * float(lines.sizes[number]), float(lines.omegas[number]) / math.tau
                 return Apart(hz, size, cause, record.scale * DecayingModes().at(t, parameters)[0])
     return None
+
+
+def _near(record: Scaled, one: float, other: float) -> bool:
+    return abs(one - other) * record.seconds < APART * math.tau
 
 
 def _above(record: Scaled, first: float, omega: F8, power: F8) -> Iterator[float]:

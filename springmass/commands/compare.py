@@ -8,7 +8,7 @@ import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -57,6 +57,7 @@ class CompareOptions:
     ] = None
     output: Annotated[FileArgument | None, output("DIR", "folder for a report (default: write no report)")] = None
     figures: FiguresOption = ()
+    template: Annotated[Literal["latex"] | None, option("KIND", "also write a lab report template: latex")] = None
     json: Json = False
     strict: Strict = False
 
@@ -82,7 +83,7 @@ def compare(
             f"compare needs two runs at least, got {len(inputs)}", "springmass analyse takes a single one"
         )
     if options.output is None:
-        given.refuse("without -o", "--figures")
+        given.refuse("without -o", "--figures", "--template")
     # Scenes are read first, so that their errors are found before an hour of recordings is read.
     scenes = read_scenes(options.scene, len(inputs))
     out = None if options.output is None else make_folder(options.output)
@@ -100,7 +101,9 @@ def compare(
     if out is not None:
         from springmass.report.write import write_report
 
-        page = write_report(out, runs, compared=compared, summary=result, figures=options.figures)
+        page = write_report(
+            out, runs, compared=compared, summary=result, figures=options.figures, template=options.template
+        )
         LOG.info(f"report: {page}")
         LOG.log(HINT, f"open {page} in a browser")
     else:

@@ -27,7 +27,7 @@ from springmass.result.grades import all_sound, grades_of, leaves_more_than_nois
 from springmass.result.law_rows import laws_across, laws_of
 from springmass.result.table1 import rows_and_needs, table_rows
 from springmass.runs.run import Run
-from springmass.typeset import cells, count, page_unit, prefixed, pretty, pretty_number, typeset
+from springmass.typeset import MANY_FREEDOM, cells, count, page_unit, prefixed, pretty, pretty_number, typeset
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -107,6 +107,7 @@ def render_html(
         joint=() if compared is None else [laws_across(joint) for joint in compared.joint],
         provenance=list(_flattened(provenance)),
         version=provenance["version"],
+        many=MANY_FREEDOM,
         **drawn_by_script(figures.charts, script),
     )
 
