@@ -32,6 +32,8 @@ def window(browser: Browser, address: str) -> Iterator[Page]:
         page = context.new_page()
         page.goto(address)
         yield page
+        if not page.is_closed():
+            page.evaluate("act('end')")  # a recorder would outlive its test
         for _ in range(page.get_by_role("button", name="Remove").count()):
             page.get_by_role("button", name="Remove").first.click()
         page.wait_for_selector("body.empty")
