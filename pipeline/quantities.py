@@ -96,7 +96,8 @@ QUANTITIES: Mapping[str, Quantity] = {quantity.name: quantity for quantity in _Q
 INPUTS: Mapping[str, Input] = {
     # Inputs estimated from the recording.
     "angular_frequency": Input("scatter of the phases", "omega", "rad/s"),
-    "small_swings": Input("scatter of the phases", "omega_s", "rad/s"),
+    "small_swings": Input("scatter of the phases, and choice of the law of the frequency", "omega_s", "rad/s"),
+    "mean_frequency": Input("mean frequency, instead of that of very small swings or at the start"),
     "phase": Input("scatter of the phases", "phi0", "rad"),
     "rest_position": Input("scatter of the rest position", "y0", Unit(1)),
     "noise": Input("scatter of the samples", "sigma", Unit(1)),

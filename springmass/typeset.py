@@ -11,6 +11,7 @@ from acquisition.errors import visible
 from pipeline.damping.law_fit import LawFit
 from pipeline.damping.select import Damping
 from pipeline.numerics.estimate import Estimate, UpperLimit
+from pipeline.several.joint import JointDamping
 
 
 class _Written(NamedTuple):
@@ -50,6 +51,7 @@ _UNITS = {
 _SUPERSCRIPT = str.maketrans("-0123456789n", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ")
 _POWER = re.compile(r"\^(?:\(([\dn-]+)\)|([\dn-]+))")
 NOTHING = "-"
+MANY_FREEDOM = 1e6  # degrees of freedom from which they are written as infinite
 
 
 def count(number: int, noun: str) -> str:
@@ -141,16 +143,17 @@ def rejection_of(fit: LawFit) -> str:
     return f"rejected: {reasons[fit.rejection]}"
 
 
-def law_status(damping: Damping, name: str) -> str:
-    """Return the status of a law in a few words, and why it is rejected."""
+def law_status(damping: Damping | JointDamping, name: str) -> str:
+    """Return the status of a law of one run or of several in a few words, and why it is rejected."""
     fit = damping.fits[name]
     if name == damping.selected:
-        if damping.by_statement:
+        if isinstance(damping, Damping) and damping.by_statement:
             return f"stated, and {rejection_of(fit)}" if fit.rejected else "stated"
         return f"{rejection_of(fit)}, yet the least bad" if fit.rejected else "selected"
     if fit.rejected:
         return rejection_of(fit)
-    return "admissible" if name in damping.possible else "unlikely"
+    possible = damping.possible if isinstance(damping, Damping) else damping.admissible
+    return "admissible" if name in possible else "unlikely"
 
 
 def cells(estimate: Estimate | None) -> str:
@@ -229,10 +232,19 @@ _SUPERSCRIPTS = {raised: plain for plain, raised in zip("-0123456789n", "⁻⁰�
 
 def tex_words(text: str) -> str:
     """Convert a sentence of the page to LaTeX, with symbols and powers as mathematics."""
-    text = tex_text(text).replace("\u00a0", "~").replace("\u202f", r"\,").replace("“", "``").replace("”", "''")
+    text = (
+        tex_text(text)
+        .replace(r"\_", r"\_\allowbreak{}")
+        .replace("\u00a0", "~")
+        .replace("\u202f", r"\,")
+        .replace("“", "``")
+        .replace("”", "''")
+    )
     text = re.sub(
         f"[{''.join(_SUPERSCRIPTS)}]+", lambda run: f"$^{{{''.join(_SUPERSCRIPTS[each] for each in run[0])}}}$", text
     )
+    # A letter before an equals sign or in u(k) is a symbol, and so is every single u.
+    text = re.sub(r"(?<![\w\\$])([A-Za-z])(?=[₀-₉]?[~ ][=<])|\b([uU]\([A-Za-z]\))|\b(u)\b", r"$\1\2\3$", text)
     for symbol, tex in _TEX_MATH.items():
         text = text.replace(symbol, f"${tex}$")
     return text.replace("°C", r"\textcelsius{}").replace("µ", r"\textmu{}").replace("–", "--")
@@ -243,16 +255,16 @@ def tex_quantity(estimate: Estimate | None) -> str:
     if estimate is None:
         return "--"
     if isinstance(estimate, UpperLimit):
-        return f"$<$ {_tex_number(estimate.written()[2:], estimate.unit)} (\\qty{{95}}{{\\percent}})"
+        return f"$<$ {tex_number(estimate.written()[2:], estimate.unit)} (\\qty{{95}}{{\\percent}})"
     match = re.fullmatch(r"(-?[\d.]+)(\([\d.]+\))?(?:e([+-]\d+))?", estimate.written(brackets=True))
     if match is None:
         return "--"
     # siunitx wants the u in the last digit: 13.9(12) for 13.9(1.2).
     power = f"e{int(match[3])}" if match[3] else ""
-    return _tex_number(f"{match[1]}{(match[2] or '').replace('.', '')}{power}", estimate.unit)
+    return tex_number(f"{match[1]}{(match[2] or '').replace('.', '')}{power}", estimate.unit)
 
 
-def _tex_number(number: str, unit: str) -> str:
+def tex_number(number: str, unit: str) -> str:
     """Write a number, possibly with its uncertainty, and its unit for siunitx."""
     if not unit:
         return rf"\num{{{number}}}"

@@ -43,7 +43,8 @@ LAW = "fit and choice of the law"
 INCLUDES = {
     "phase_slope": "scatter, correlation and bend of the phases",
     "start_phase": "scatter, correlation and bend of the phases",
-    "small_swings": "scatter of the phases",
+    "small_swings": "scatter of the phases, choice of the law",
+    "stiffness_factor": "change of the frequency",
     **dict.fromkeys(("law", "law_start", "law_rate", "law_rms"), LAW),
     "rest_position": "scatter, correlation and drift of the rest position",
     "noise_of_samples": "counting statistics, difference from the root mean square, share of samples left out",

@@ -41,14 +41,15 @@ def compare_halves(fitted: Motion) -> tuple[Motion, tuple[Notice, ...]]:
         return fitted, ()
     each = {name: _of_law(fit, damping, windows.t, windows.amplitude) for name, fit in damping.fits.items()}
     fits = {name: _widened(fit, each[name]) for name, fit in damping.fits.items()}
-    small, backbone = (None if x is None else _wider(x, turned) for x in (phase.small_swings, phase.backbone))
-    if phase.area is None:
+    if phase.bend is None:
         omega, start = (_wider(x, turned) for x in (phase.angular_frequency, phase.phase))
         phase = replace(phase, angular_frequency=omega, phase=start)
+    elif phase.small_swings is not None:
+        phase = replace(phase, small_swings=_wider(phase.small_swings, turned))
     fitted = replace(
         fitted,
         damping=replace(damping, fits=fits),
-        phase=replace(phase, small_swings=small, backbone=backbone),
+        phase=phase,
         rest=replace(rest, mean=_wider(rest.mean, at_rest)),
     )
     return fitted, (Notice("halves_differ", {"chi2": chi2, "parameters": count}),)

@@ -37,6 +37,7 @@ class FindingKind:
     harm: str = "uncertainty"
     doubts: tuple[str, ...] = ()
     doubts_above: Mapping[str, float] = field(default_factory=dict)
+    doubts_anyway: tuple[str, ...] = ()
     about: tuple[str, ...] = ()
     explains: tuple[str, ...] = ()
     consequence: str | None = None
@@ -71,7 +72,7 @@ def kinds() -> Mapping[str, FindingKind]:
 
 
 def _field(name: str, value: Any) -> Any:
-    if name in ("severity", "says", "details", "advice", "doubts", "about", "explains"):
+    if name in ("severity", "says", "details", "advice", "doubts", "doubts_anyway", "about", "explains"):
         return (value,) if isinstance(value, str) else tuple(value)
     return value
 

@@ -77,12 +77,10 @@ def motion_findings(fitted: Oscillation) -> Iterator[Notice]:
     if windows.lost:
         lost = {"periods": windows.lost, "all_periods": windows.lost + count}
         yield Notice("missing_samples", lost, "warning")
-    if phase.backbone is not None:
-        start, shift = fitted.first_shift(phase.backbone.value)
-        # In computed data drag itself shifts the frequency, by the square of the decrease of the amplitude in a radian.
-        if abs(shift) > (fitted.damping.best.rate_at_start() / omega) ** 2:
-            numbers = {"relative_shift": shift, "amplitude_m": start}
-            yield Notice("amplitude_dependent_frequency", {**numbers, "higher" if shift > 0 else "lower": abs(shift)})
+    # In computed data drag itself shifts the frequency, by the square of the decrease of the amplitude in a radian.
+    least = (fitted.damping.best.rate_at_start() / omega) ** 2
+    if phase.bend is not None and phase.walk is None and abs(fitted.shift) > least:
+        yield _changing(fitted)
     # In computed data, changes of the rest position below the error of the sinusoidal model affect no number.
     errors = model_error(windows.amplitude, windows.decay, windows.angular_frequency)
     if rest.drifts and rest.drift > float(np.max(errors)):
@@ -90,6 +88,17 @@ def motion_findings(fitted: Oscillation) -> Iterator[Notice]:
     if rest.mean.unit == "m/s^2":
         yield Notice("one_axis")
     yield from _modes(fitted, rest.mean.unit)
+
+
+def _changing(fitted: Oscillation) -> Notice:
+    """Return how the frequency changes: with the amplitude, with time, or with one of them."""
+    bend, shift = fitted.phase.bend, fitted.shift
+    if bend is None or fitted.phase.of_amplitude:
+        start = float(fitted.damping.best.joint.values[0])
+        numbers = {"relative_shift": shift, "amplitude_m": start, "higher" if shift > 0 else "lower": abs(shift)}
+        return Notice("amplitude_dependent_frequency", numbers)
+    either = {"either": abs(shift)} if bend.by_amplitude else {}
+    return Notice("frequency_drift", {"relative_shift": shift, "rises" if shift > 0 else "falls": abs(shift), **either})
 
 
 def _rest_drift(rest: RestPosition, u_rate: float) -> Notice:

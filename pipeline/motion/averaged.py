@@ -1,8 +1,9 @@
 """The motion averaged over cycles: rest position, amplitude by a law, and phase, fitted to windows or to samples.
 
-The motion is :math:`y = r(t) + A(t; \\theta)\\cos\\bigl(\\varphi + \\omega\\tau + \\kappa\\int A^2 - \\ell(t)\\bigr)`,
-with :math:`\\tau` from the middle of the record, where frequency and phase are uncorrelated. The windows give points of
-amplitude, phase and rest position, which determine the three parts independently of each other.
+The motion is :math:`y = r + A(t; \\theta)\\cos(\\varphi + \\omega\\tau + \\sum_n\\kappa_n B_n(t) - \\ell(t))`, with
+:math:`\\tau` from the middle of the record, where frequency and phase are uncorrelated, and the integrals :math:`B_n`
+of the terms by which the frequency changes. The windows give points of amplitude, phase and rest position, which
+determine the three parts independently of each other.
 """
 
 from __future__ import annotations
@@ -18,9 +19,10 @@ from pipeline.damping.law_fit import LawFit
 from pipeline.damping.laws import Law
 from pipeline.damping.select import Damping
 from pipeline.modes.mode import Modes
-from pipeline.motion.fitted import Method, Oscillation, Phase, RestPosition, TimeTable, Waveform, delay, wrapped
+from pipeline.motion.fitted import Method, Oscillation, Phase, RestPosition, Waveform, delay, wrapped
+from pipeline.motion.frequency import TABLE_POINTS, Phases, TimeTable, amplitude_table, find_bend, turns
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_LINE, VERY_STRONG
+from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_CURVE, FEWEST_FOR_LINE, VERY_STRONG
 from pipeline.numerics.regression import (
     Line,
     Scatter,
@@ -28,18 +30,11 @@ from pipeline.numerics.regression import (
     correlation_length,
     scatter,
     smooth_curve,
-    solve_weighted,
 )
 from pipeline.track import F8
-from pipeline.units import Unit
 from pipeline.windows.cycles import NoOscillation
 from pipeline.windows.demodulate import ROUNDING, Windows
 
-BACKBONE = Unit(-2, -1, radian=1)  # of the coefficient by which the frequency depends on the squared amplitude
-# Number of points in the tables of the lag and of the integral of the squared amplitude. If that falls by e^10 within a
-# table, the trapezoidal rule errs by h^2/12 = 2e-6: P. J. Davis, P. Rabinowitz, "Methods of Numerical Integration"
-# (1984).
-TABLE_POINTS = 2049
 # Nodes of the quadrature of the decay rate over amplitudes, exact up to the power 15 (the same book, (1984)).
 NODES = 8
 # Maximum lag in rad by averaging (Bogoliubov and Mitropolsky (1961)): that of friction which halves the amplitude
@@ -57,13 +52,13 @@ class Averaged:
     middle: float
     reach: float  # largest distance of a sample from the middle, s
     degree: int  # of the polynomial of the rest position
-    area: TimeTable | None
+    tables: tuple[TimeTable, ...]  # of the change of the frequency
     lag: TimeTable | None
 
     def split(self, values: F8) -> tuple[F8, F8, F8]:
         """Return the parameters of law, phase and rest position."""
         first = len(self.law.parameters)
-        second = first + (2 if self.area is None else 3)
+        second = first + 2 + len(self.tables)
         return values[:first], values[first:second], values[second:]
 
     def rest(self, t: F8) -> F8:
@@ -74,15 +69,15 @@ class Averaged:
         """Return the positions (n,) at t, and a function that gives their derivatives (n, p)."""
         theta, turning, still = self.split(values)
         amplitude, by_theta = self.law.curve(np.clip(t, self.t0, self.last) - self.t0, theta)
-        turns, rest = _turns(t, self.middle, self.area), self.rest(t)
-        angle = turns @ turning - delay(t, self.lag)
+        columns, rest = turns(t, self.middle, self.tables), self.rest(t)
+        angle = columns @ turning - delay(t, self.lag)
         cosine = np.cos(angle)
 
         def slopes() -> F8:
             rows = np.empty((values.size, t.size))
             first, second = theta.size, theta.size + turning.size
             np.multiply(by_theta.T, cosine, out=rows[:first])
-            np.multiply(turns.T, -amplitude * np.sin(angle), out=rows[first:second])
+            np.multiply(columns.T, -amplitude * np.sin(angle), out=rows[first:second])
             rows[second:] = rest.T
             return rows.T
 
@@ -116,7 +111,7 @@ def assembled(
 
     rms = math.sqrt(float(left @ left) / left.size)
     whole = position if modes.subtracted is None else position + modes.subtracted
-    waveform = Waveform(whole, partial(_velocity, best, phase, amplitude, angle), residual, rms)
+    waveform = Waveform(whole, partial(_velocity, best, phase, amplitude, track.t, angle), residual, rms)
     return Oscillation(
         windows=windows,
         modes=modes,
@@ -130,18 +125,17 @@ def assembled(
     )
 
 
-def _velocity(best: LawFit, phase: Phase, amplitude: F8, angle: F8) -> F8:
+def _velocity(best: LawFit, phase: Phase, amplitude: F8, t: F8, angle: F8) -> F8:
     growth = best.law.rate(amplitude, best.joint.values)
-    return np.asarray(growth * np.cos(angle) - amplitude * phase.rate(amplitude) * np.sin(angle))
+    return np.asarray(growth * np.cos(angle) - amplitude * phase.rate(amplitude, t) * np.sin(angle))
 
 
 def fit_phase(windows: Windows, damping: Damping, last: float) -> Phase:
-    """Fit a constant frequency to the windows' phases and test it against one that depends on amplitude.
+    """Fit a constant frequency to the windows' phases and test it against those that change.
 
     The reported frequency is the record's mean, whether or not the frequency varies. If the residuals of the straight
-    line are not white, its covariance is widened, so that the interval covers a curvature of the phase. A nonlinear
-    spring shifts the frequency in proportion to the square of the amplitude. The delay of a period's fitted sinusoid
-    (:func:`lag_of`) follows from the damping law and is removed first.
+    line are not white, its covariance is widened, so that the interval covers a curvature of the phase. The delay of a
+    period's fitted sinusoid (:func:`lag_of`) follows from the damping law and is removed first.
     """
     t, t0 = windows.t, damping.t0
     noise = np.maximum(np.sqrt(windows.covariance[:, 1, 1]), ROUNDING)
@@ -153,35 +147,29 @@ def fit_phase(windows: Windows, damping: Damping, last: float) -> Phase:
     kept = spread.kept
     u = spread.u[kept]
     middle = float(np.average(t[kept], weights=1.0 / u**2))
-    line = _turns(t, middle, None)
-    model = straight = solve_weighted(line[kept], phase[kept], u)
-    area = None
-    if u.size >= 8 and len(damping.best.law.parameters) > 1:
-        table = area_of(damping.best.law, damping.best.joint.values, t0, middle, last)
-        bent = solve_weighted(_turns(t, middle, table)[kept], phase[kept], u)
-        if (straight.chi2 - bent.chi2) / spread.correlation - math.log(u.size / spread.correlation) > VERY_STRONG:
-            model, area = bent, table
+    phases = Phases(t, phase, spread, t0, middle)
+    bend, small, best = None, None, damping.best
+    model = straight = phases.fit()
+    if u.size >= FEWEST_FOR_CURVE:
+        amplitude = amplitude_table(best.law, best.joint.values, t0, last)
+        bent = find_bend(phases, straight, amplitude, decays=len(best.law.parameters) > 1)
+        bend, model, small = bent or (None, straight, None)
     widened, length = _widening(straight, u, spread)
     covariance = straight.covariance * widened
     first = np.array([t0])
-    at_start = float((_turns(first, middle, area) @ model.values - delay(first, lag))[0])
-    start, free = _turns(first, middle, None)[0], max(u.size - model.values.size, 1)
-    backbone = small = None
-    if area is not None:
-        u_bent = np.sqrt(np.diag(model.covariance) * spread.correlation * max(1.0, model.chi2 / free))
-        small = Estimate(float(model.values[1]), float(u_bent[1]), "rad/s")
-        backbone = Estimate(float(model.values[2]), float(u_bent[2]), BACKBONE.of(damping.best.joint.units[0]))
+    tables = () if bend is None else bend.tables
+    at_start = float((turns(first, middle, tables) @ model.values - delay(first, lag))[0])
+    start, free = turns(first, middle, ())[0], max(u.size - model.values.size, 1)
     return Phase(
         t0=t0,
         angular_frequency=Estimate(float(straight.values[1]), math.sqrt(covariance[1, 1]), "rad/s"),
         phase=Estimate(wrapped(at_start), math.sqrt(float(start @ covariance @ start)), "rad"),
-        backbone=backbone,
         reduced_chi2=model.chi2 / free,
         correlation=length,
-        residual=phase - line @ straight.values,
+        residual=phase - turns(t, middle, ()) @ straight.values,
         coefficients=model.values,
         middle=middle,
-        area=area,
+        bend=bend,
         lag=lag,
         small_swings=small,
         spread=spread,
@@ -195,7 +183,6 @@ def _single(windows: Windows, t0: float, noise: float) -> Phase:
         t0=t0,
         angular_frequency=Estimate(omega, math.pi / max(2.0 * (t - t0), 1e-9), "rad/s"),
         phase=Estimate(wrapped(own + omega * (t0 - t)), math.hypot(noise, 0.5 * math.pi), "rad"),
-        backbone=None,
         reduced_chi2=math.nan,
         correlation=1.0,
         residual=np.zeros(1),
@@ -212,14 +199,6 @@ def _widening(line: Line, u: F8, spread: Scatter) -> tuple[float, float]:
     length = max(correlation_length(line.residual / u), spread.correlation)
     too_large = line.chi2 > chi2_quantile(1.0 - FALSE_ALARM, free)
     return length * (line.chi2 / free if too_large else 1.0), length
-
-
-def _turns(t: F8, middle: float, area: TimeTable | None) -> F8:
-    """Return the columns of the phase: 1, the time from the middle and, with a backbone, the integral of A^2."""
-    columns = [np.ones(t.size), t - middle]
-    if area is not None:
-        columns.append(np.interp(t, *area))
-    return np.stack(columns, axis=1)
 
 
 def lag_of(fit: LawFit, t0: float, windows: Windows) -> TimeTable | None:
@@ -246,17 +225,6 @@ def lag_of(fit: LawFit, t0: float, windows: Windows) -> TimeTable | None:
         lag = (0.5 * rate + mean) / (windows.angular_frequency * amplitude)
     lag = np.clip(np.where(np.isfinite(lag), lag, 0.0), -MOST_LAG, MOST_LAG)
     return (t, lag) if float(np.ptp(lag)) > 1e-12 else None
-
-
-def area_of(law: Law, theta: F8, t0: float, middle: float, last: float) -> TimeTable:
-    """Return the integral of A^2 from the middle, from t0 to the last time."""
-    from scipy.integrate import cumulative_trapezoid
-
-    grid = np.linspace(t0, max(last, t0 + 1e-9), TABLE_POINTS)
-    power = law.curve(grid - t0, theta)[0] ** 2
-    power[~np.isfinite(power)] = 0.0
-    integral = cumulative_trapezoid(power, grid, initial=0.0)
-    return grid, np.asarray(integral - np.interp(middle, grid, integral))
 
 
 def fit_rest(windows: Windows, unit: str) -> RestPosition:

@@ -11,9 +11,10 @@ import numpy as np
 from pipeline.damping.law_fit import LawFit, joint_of
 from pipeline.damping.laws import LAWS, Law
 from pipeline.damping.select import Damping
-from pipeline.motion.averaged import Averaged, area_of, assembled
+from pipeline.motion.averaged import Averaged, assembled
 from pipeline.motion.fit import Rows, clipped, covariance_of, fit
 from pipeline.motion.fitted import Oscillation, Phase, RestPosition, wrapped
+from pipeline.motion.frequency import amplitude_table, bends_of, turns
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import Fit
 from pipeline.numerics.levels import BARE_MENTION, ROUNDS, STRONG
@@ -59,7 +60,7 @@ def fit_samples(fitted: Oscillation, samples: Samples) -> Oscillation:
         middle=phase.middle,
         reach=reach,
         degree=degree,
-        area=phase.area,
+        tables=phase.tables,
         lag=lags[first],
     )
     rest = np.zeros(model.degree + 1)
@@ -67,9 +68,10 @@ def fit_samples(fitted: Oscillation, samples: Samples) -> Oscillation:
         rest = np.asarray(np.linalg.lstsq(model.rest(windows.t), fitted.rest.curve - level, rcond=None)[0])
     start = np.concatenate([thetas[first], phase.coefficients, rest])
     least = float(np.median(model_error(windows.amplitude, windows.decay, windows.angular_frequency)))
-    for _ in range(1 if model.area is None else 2):
-        if model.area is not None:  # until the last round the backbone's column belongs to other amplitudes
-            model = replace(model, area=area_of(model.law, model.split(start)[0], model.t0, model.middle, model.last))
+    for _ in range(1 if phase.bend is None else 2):
+        if phase.bend is not None:  # until the last round the columns of its change belong to other amplitudes
+            amplitude = amplitude_table(model.law, model.split(start)[0], model.t0, model.last)
+            model = replace(model, tables=bends_of(phase.bend.law, amplitude, model.middle))
         # Few periods cannot tell false echoes from a motion that the model does not describe; the windows' stand.
         scale = {"least": least, "noise": windows.noise}
         found, rows = clipped(model, rows, start, **scale, rounds=1 if few else ROUNDS)
@@ -186,21 +188,22 @@ def _phase(phase: Phase, windows: Windows, best: _OfLaw) -> Phase:
     _, turning, _ = model.split(best.fit.values)
     first = len(model.law.parameters)
     covariance = best.covariance[first : first + turning.size, first : first + turning.size]
-    area = model.area
-    found = replace(phase, coefficients=turning, area=area, lag=model.lag)
-    gradient = np.array([1.0, phase.t0 - phase.middle])
+    bend = phase.bend
     omega = Estimate(float(turning[1]), math.sqrt(covariance[1, 1]), "rad/s")
-    backbone = small = None
-    if area is not None and phase.backbone is not None:
-        gradient = np.append(gradient, np.interp(phase.t0, *area))
-        small, backbone = omega, Estimate(float(turning[2]), math.sqrt(covariance[2, 2]), phase.backbone.unit)
+    small = phase.small_swings
+    if bend is not None:
+        bend = replace(bend, tables=model.tables)
+        if bend.law.by == "amplitude":
+            small = Estimate(omega.value, math.hypot(omega.u, bend.u_choice), "rad/s")
+    found = replace(phase, coefficients=turning, bend=bend, lag=model.lag, small_swings=small)
+    gradient = found.columns(np.array([phase.t0]))[0]
+    if bend is not None:
         u = np.maximum(np.sqrt(windows.covariance[:, 1, 1]), 1e-12)
-        columns = np.stack([np.ones(windows.t.size), windows.t - phase.middle], axis=1)
-        line = solve_weighted(columns, replace(found, lag=None).total(windows.t), u)
+        line = solve_weighted(turns(windows.t, phase.middle, ()), replace(found, lag=None).total(windows.t), u)
         omega = Estimate(float(line.values[1]), phase.angular_frequency.u, omega.unit)
     at_start = wrapped(float(found.total(np.array([phase.t0]))[0]))
     start = Estimate(at_start, math.sqrt(float(gradient @ covariance @ gradient)), "rad")
-    return replace(found, angular_frequency=omega, phase=start, backbone=backbone, small_swings=small)
+    return replace(found, angular_frequency=omega, phase=start)
 
 
 def _rest(rest: RestPosition, best: _OfLaw, level: float) -> RestPosition:

@@ -445,7 +445,6 @@ def _described(
         t0=t0,
         angular_frequency=Estimate(omega, u_omega, "rad/s"),
         phase=Estimate(wrapped(start), u_phase, "rad"),
-        backbone=None,
         reduced_chi2=best.reduced_chi2,
         correlation=damping.scatter.correlation,
         residual=windows.phase - centre - omega * (t - middle),

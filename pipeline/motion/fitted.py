@@ -12,56 +12,58 @@ import numpy as np
 
 from pipeline.damping.select import Damping
 from pipeline.modes.mode import Modes
+from pipeline.motion.frequency import Bend, TimeTable, turns
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.levels import NOTICEABLE
 from pipeline.numerics.regression import Scatter
 from pipeline.track import F8, U8
 from pipeline.windows.demodulate import Windows
 from pipeline.windows.walk import Walk
 
-TimeTable = tuple[F8, F8]  # values at ascending times, s
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Phase:
-    """Total phase against time: a straight line, a backbone if one shows, less the lag of a period's sinusoid."""
+    """Total phase against time: a straight line, bent if the frequency changes, less the lag of a period's sinusoid."""
 
     t0: float  # time of the start, s
     angular_frequency: Estimate  # mean over the record: the slope of a straight line through the phases
     phase: Estimate  # at t0, wrapped into (-pi, pi]
-    backbone: Estimate | None  # kappa of omega(A) = omega + kappa A^2; None if it is not significant
     reduced_chi2: float
     correlation: float  # of the straight line's residuals, as a number of windows
     residual: F8  # (w,) phases minus the straight line, rad
-    coefficients: F8  # of 1, of t - middle and, with a backbone, of the integral of A^2
+    coefficients: F8  # of 1, of t - middle and of the integrals of the terms by which the frequency changes
     middle: float  # weighted mean time, s
-    area: TimeTable | None = None  # integral of A^2 from the middle; with a backbone
+    bend: Bend | None = None  # how the frequency changes; None if a constant describes the phases
     lag: TimeTable | None = None  # delay of a period's sinusoid, rad; None if it is constant
-    small_swings: Estimate | None = None  # angular frequency of very small swings; with a backbone or of a pendulum
-    of_pendulum: bool = False  # whether these follow from the law of a pendulum
+    small_swings: Estimate | None = None  # angular frequency of very small swings, by a law of the amplitude
+    of_pendulum: bool = False  # whether this law is that of a pendulum
     walk: Walk | None = None  # of amplitude and phase, if they wander at random; the frequency is that of the walk
     spread: Scatter | None = None  # of the windows' phases about a smooth curve; None of a single window
     squared_rate: float | None = None  # decrease of the squared frequency by drag, 1/s^2; None: that of the windows
 
+    @property
+    def of_amplitude(self) -> bool:
+        """Whether the frequency changes with the amplitude, and the law of time that fits as well is excluded."""
+        return self.of_pendulum or (self.bend is not None and not self.bend.by_time)
+
+    @property
+    def tables(self) -> tuple[TimeTable, ...]:
+        """The integrals of the terms by which the frequency changes."""
+        return () if self.bend is None else self.bend.tables
+
     def total(self, t: F8) -> F8:
         """Return the total phase in rad at times t (n,)."""
-        level, slope, *bend = self.coefficients.tolist()
-        total = level + slope * (t - self.middle)
-        if self.area is not None:
-            total += bend[0] * np.interp(t, *self.area)
-        return np.asarray(total - delay(t, self.lag))
+        return np.asarray(self.columns(t) @ self.coefficients - delay(t, self.lag))
 
     def columns(self, t: F8) -> F8:
         """Return the derivatives (n, p) of :meth:`total` by the coefficients."""
-        columns = [np.ones(t.size), t - self.middle]
-        if self.area is not None:
-            columns.append(np.interp(t, *self.area))
-        return np.stack(columns, axis=1)
+        return turns(t, self.middle, self.tables)
 
-    def rate(self, amplitude: F8) -> F8:
-        """Return the angular frequency in rad/s at amplitudes (n,)."""
-        bend = self.coefficients[2] if self.area is not None else 0.0
-        return np.asarray(self.coefficients[1] + bend * amplitude**2)
+    def rate(self, amplitude: F8, t: F8) -> F8:
+        """Return the angular frequency in rad/s at amplitudes and times (n,)."""
+        rate = np.full(t.size, self.coefficients[1])
+        if self.bend is not None:
+            rate += self.coefficients[2:] @ np.array(self.bend.law.terms(amplitude, t - self.middle))
+        return rate
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,21 +142,15 @@ class Oscillation:
         """The time for which amplitude, phase and damping rate are stated, s."""
         return self.phase.t0
 
-    def first_shift(self, kappa: float) -> tuple[float, float]:
-        """Return the first amplitude, and the shift of the frequency from very small swings to it, over the frequency.
-
-        A large shift that the first windows do not show to half its size does not grow with the square of the
-        amplitude; then it is theirs, at their mean amplitude.
-        """
-        windows, omega, small = self.windows, self.phase.angular_frequency.value, self.phase.small_swings
-        start = self.damping.best.joint["A0"].value
-        shift, last = kappa * start**2 / omega, max(2, windows.t.size // 20)
-        if small is None or abs(shift) < NOTICEABLE or last >= windows.t.size:
-            return start, shift
-        mean = float(np.mean(windows.amplitude[: last + 1]))
-        turned, passed = (float(each[last] - each[0]) for each in (windows.phase, windows.t))
-        shown = turned / passed / small.value - 1.0
-        return (mean, shown) if abs(shown) < 0.5 * abs(kappa) * mean**2 / omega else (start, shift)
+    @property
+    def shift(self) -> float:
+        """The relative shift of the frequency from very small swings to the first ones, or with time over the run."""
+        phase = self.phase
+        ends = np.array([phase.t0, float(np.max(self.windows.t))])
+        first, last = phase.rate(self.damping.best.amplitude(ends - phase.t0), ends).tolist()
+        if phase.small_swings is not None and phase.of_amplitude:
+            return float(first / phase.small_swings.value - 1.0)
+        return float((last - first) / phase.angular_frequency.value)
 
 
 def delay(t: F8, lag: TimeTable | None) -> F8 | float:

@@ -42,7 +42,7 @@ def fit_motion(part: Part, options: Options) -> Motion:
     laws = fit_laws(windows, start_s, options.laws, options.known_law, samples.track.unit, coarse=coarse)
     if part.walk is not None:
         fitted = fit_windows(windows, modes, laws)
-        phase = replace(fitted.phase, angular_frequency=part.walk.angular_frequency, walk=part.walk)
+        phase = replace(fitted.phase, angular_frequency=part.walk.angular_frequency, small_swings=None, walk=part.walk)
         return replace(fitted, phase=phase)
     solved = fit_equation(samples, windows, laws, stopped=part.stopped)
     fitted = solved if isinstance(solved, Oscillation) else _averaged(windows, modes, laws, samples, options)

@@ -152,7 +152,9 @@ class DecayingLines:
     def leaves_noise(self, samples: Samples) -> bool:
         """Return whether the lines leave no more than noise, whose estimates by both ways scatter as in white noise."""
         chance = OUTLIER * math.sqrt(8.5 / self.residual.size)
-        return self.left < (1.0 + chance) * (samples.noise_of_reading / self.record.scale) ** 2
+        noise = (samples.noise_of_reading / self.record.scale) ** 2
+        # Where each period has few samples, neighbours differ by the motion, and what seems noise is far larger.
+        return 0.25 * noise < self.left < (1.0 + chance) * noise
 
     def are_several(self) -> bool:
         """Return whether these are several oscillations, and not one that changes or is no sinusoid.

@@ -21,7 +21,7 @@ from pipeline.motion.fit import Rows, allowed
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.least_squares import CENTRAL_STEP, Fit
-from pipeline.numerics.levels import FEWEST_FOR_CURVE, STRONG, VERY_STRONG
+from pipeline.numerics.levels import FEWEST_FOR_CURVE, NEGLIGIBLE, STRONG, VERY_STRONG
 from pipeline.numerics.regression import correlation_length, covariance_of
 from pipeline.samples.condition import Samples
 from pipeline.track import F8, U8, Quality
@@ -196,8 +196,8 @@ def _grid(rows: Rows, rate_hz: float) -> F8:
 
 DampingKind = Literal["overdamped", "critical", "strong"]
 
-# Approximate number of block means to which a record is reduced before shapes are compared; all shapes then take 7 ms,
-# as measured.
+# Approximate number of block means by which a record may show a motion: white noise does with a probability of 6 %
+# (chi-square), and is then fitted in vain.
 BLOCK_MEANS = 300
 # Minimum damping ratio zeta of a strongly damped oscillation; below it the cycles are analysed instead.
 LEAST_DAMPING = 0.05
@@ -253,8 +253,8 @@ def find_relaxation(samples: Samples) -> Relaxation | NoOscillation | None:
     if the record is no relaxation but noise, a drift, a step, a ramp or a weakly damped oscillation.
 
     A relaxation must leave no more than noise, also in its moving part alone, and end within the record (:math:`gT >
-    2`). The evidence for it against every polynomial up to degree three, every step and every ramp must be very strong,
-    and that against a single exponential strong. Critical damping and the free fit are compared by BIC. If a record
+    2`). The evidence for it against a single exponential must be strong. Critical damping and the free fit are compared
+    by BIC. If a record
     begins before the release, the fit begins where the displacement begins to fall.
     """
     used = samples.used
@@ -280,12 +280,17 @@ def _moves(y: F8, noise: float) -> bool:
 
 
 def _starts(y: F8, noise: float) -> Iterator[int]:
-    """Yield the rows at which the motion may begin: the first sample, then the release of a held displacement."""
+    """Yield the rows at which the motion may begin: the first sample, then the release of a held displacement.
+
+    A bob that before that comes nearer to rest than half of the displacement swings, and moves freely from the first
+    sample.
+    """
     yield 0
-    rest = float(np.median(y[-max(y.size // 10, 5) :]))
-    away = np.abs(y - rest)
-    held = np.flatnonzero(away >= float(np.median(away[: max(y.size // 50, 5)])) - 3.0 * noise)
-    if held.size and 5 < held[-1] < y.size - 20:
+    away = y - float(np.median(y[-max(y.size // 10, 5) :]))
+    level = float(np.median(away[: max(y.size // 50, 5)]))
+    away = away * math.copysign(1.0, level)
+    held = np.flatnonzero(away >= abs(level) - 3.0 * noise)
+    if held.size and 5 < held[-1] < y.size - 20 and np.mean(away[: held[-1]] < 0.5 * abs(level)) < NEGLIGIBLE:
         yield int(held[-1])
 
 
@@ -294,8 +299,6 @@ def _follow(t: F8, y: F8, noise: float, samples: Samples) -> Relaxation | NoOsci
     rows, track = Rows(t - t[0], y, every, every, noise), samples.track
     found = best_decay(rows, track.rate_hz)
     if found is None or not found.rate * rows.t[-1] > 2.0 or _misses(rows, found):
-        return None
-    if not _beats_other_shapes(rows, found):
         return None
     choice = _kind(rows, found, 0.5 * track.rate_hz, track.unit)
     if choice is None or isinstance(choice, NoOscillation):
@@ -340,41 +343,6 @@ def _scatter(rows: Rows, found: Decay) -> float:
     base = np.linalg.qr(damped(rows.t[:size] - rows.t[0], found.values[3:]))[0]
     squares = np.sum((blocks - base @ (base.T @ blocks)) ** 2, axis=0)
     return math.sqrt(float(np.median(squares)) / (size - 3))
-
-
-def _beats_other_shapes(rows: Rows, found: Decay) -> bool:
-    """Return whether the relaxation explains the record better than any polynomial, step or ramp does."""
-    size = max(1, rows.t.size // BLOCK_MEANS)
-    whole = rows.t.size // size * size
-    each = (rows.t, rows.y, rows.left(DAMPED, found.values))
-    t, values, left = (x[:whole].reshape(-1, size).mean(axis=1) for x in each)
-    sigma = rows.u / math.sqrt(size)
-    mine = float(np.sum(left**2)) / sigma**2 + 5.0 * math.log(t.size)
-    others = min(left / sigma**2 + count * math.log(t.size) for left, count in _other_shapes(t, values))
-    return mine + VERY_STRONG < others
-
-
-def _other_shapes(t: F8, y: F8) -> Iterator[tuple[float, int]]:
-    """Yield squared residuals and number of parameters of polynomials up to degree three, the best step, and ramps."""
-    x = 2.0 * t / t[-1] - 1.0
-    for degree in range(4):
-        yield _left(np.polynomial.legendre.legvander(x, degree), y), degree + 1
-    n = t.size
-    splits = np.arange(3, n - 3)
-    total, squares = np.cumsum(y), float(y @ y)
-    before, after = total[splits - 1] ** 2 / splits, (total[-1] - total[splits - 1]) ** 2 / (n - splits)
-    yield squares - float(np.max(before + after)), 3
-    knots = np.linspace(t[0], t[-1], 26)
-    for i, first in enumerate(knots[:-1]):
-        for last in knots[i + 1 :]:
-            ramp = np.clip((t - first) / (last - first), 0.0, 1.0)
-            yield _left(np.stack([np.ones(n), ramp], axis=1), y), 4
-
-
-def _left(design: F8, y: F8) -> float:
-    values = np.linalg.lstsq(design, y, rcond=None)[0]
-    residual: F8 = y - design @ values
-    return float(np.sum(residual**2))
 
 
 def _kind(rows: Rows, fit: Decay, fastest: float, unit: str) -> tuple[DampingKind, Decay] | NoOscillation | None:

@@ -166,7 +166,7 @@ def kinematics(track: Track, fitted: Oscillation, laws: Sequence[Weighted]) -> S
         u_angle = np.interp(t, at, np.sqrt(windows.covariance[:, 1, 1]))
     swing = size * np.exp(1j * angle)
     decay = -best.law.rate(np.abs(size), best.joint.values) / np.maximum(np.abs(size), 1e-300)
-    turn = 1j * phase.rate(size) - np.where(np.isfinite(decay), decay, 0.0)
+    turn = 1j * phase.rate(size, t) - np.where(np.isfinite(decay), decay, 0.0)
     x, v, a = np.real(swing), np.real(turn * swing), np.real(turn**2 * swing)
     if solved:
         x, v = fitted.waveform.position - fitted.rest.at(t), fitted.waveform.velocity

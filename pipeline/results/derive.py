@@ -227,7 +227,8 @@ def _of_motion(
     # With one or two windows the uncertainty comes from the samples.
     free = (count - 2) / phase.correlation if count > 2 else windows.residual.size - 3.0 * count
     slope = inputs.add("angular_frequency", phase.angular_frequency, "A", free)
-    small = _small_swings(phase, laws, windows)
+    bend = phase.bend
+    small, apart = phase.small_swings, 0.0 if bend is None else bend.apart / phase.angular_frequency.value
     return {
         "phase_slope": slope,
         "small_swings": None if small is None else inputs.add("small_swings", small, "A", free),
@@ -241,7 +242,8 @@ def _of_motion(
         "law_rms": laws.root_mean_square,
         "decays": laws.values[1] > 0 or None,
         "beta_settled": (damping.settled and damping.best.drag_term("beta") is not None) or None,
-        "crest": _crest(phase, laws, unit, inputs),
+        "crest": _crest(fitted, unit, inputs),
+        "stiffness_factor": 1.0 + 2.0 * inputs.add("mean_frequency", Estimate(0.0, apart, ""), "B") if apart else 1.0,
         "rest_position": inputs.add("rest_position", rest.mean, "A", free),
         "sensor_zero": inputs.add("sensor_zero", Estimate(0.0, instrument.u_offset_m, unit), "B"),
         "offset_misfit": amiss["offset"],
@@ -281,30 +283,16 @@ def _of_scene(track: Track, scene: Scene, included: set[str], inputs: Inputs) ->
     }
 
 
-def _small_swings(phase: Phase, laws: _Laws, windows: Windows) -> Estimate | None:
-    """Return the angular frequency of very small swings; the next term of the series is part of its uncertainty.
-
-    If the frequency of a swing is a share s off, the next term is about :math:`s^2/4`, as for a pendulum. What it adds
-    to the value extrapolated to s = 0 is about :math:`s_1 s_2/4`, with the shares of the first and the median swing.
-    """
-    small = phase.small_swings
-    if small is None or phase.backbone is None or phase.of_pendulum:
-        return small
-    squares = float(laws.values[0]) ** 2 * float(np.median(windows.amplitude**2))
-    next_term = 0.25 * (phase.backbone.value / small.value) ** 2 * squares * small.value
-    return Estimate(small.value, math.hypot(small.u, next_term), small.unit)
-
-
-def _crest(phase: Phase, laws: _Laws, unit: str, inputs: Inputs) -> Any:
+def _crest(fitted: Oscillation, unit: str, inputs: Inputs) -> Any:
     """Return the largest angle of the first swing over the amplitude of its sinusoid.
 
-    A stiffness that changes as the square of the amplitude by :math:`\\Delta\\omega/\\omega_0 = \\kappa A^2/\\omega_0`
-    gives a third harmonic of :math:`\\kappa A^2/12\\omega_0` of the amplitude: half of a per cent for a pendulum at 60
-    degrees. Half of it is its uncertainty, because the frequency may change for another reason.
+    A stiffness that changes as the square of the amplitude gives a third harmonic of a twelfth of the shift of the
+    frequency: half of a per cent for a pendulum at 60 degrees. Half of it is its uncertainty, because the frequency may
+    change for another reason.
     """
-    if phase.backbone is None or phase.small_swings is None or unit != "rad":
+    if not fitted.phase.of_amplitude or unit != "rad":
         return 1.0
-    third = phase.backbone.value * float(laws.values[0]) ** 2 / (12.0 * phase.small_swings.value)
+    third = fitted.shift / 12.0
     return 1.0 + inputs.add("crest", Estimate(third, 0.5 * abs(third), ""), "B")
 
 

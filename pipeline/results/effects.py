@@ -63,7 +63,7 @@ def tabulate(track: Track, fitted: Oscillation, scene: Scene) -> tuple[Effect, .
     return (
         *_masses(scene, counted),
         _disc_drag(scene, damping, omega.value, unit),
-        _backbone(fitted),
+        _bend(fitted),
         _rest_drift(fitted.rest, fitted.windows.noise),
         *_modes(fitted.modes, unit),
         *((_buoyancy(scene, omega.value, 1.0, "m"), _speed_of_sound(scene, instrument)) if unit == "m" else ()),
@@ -175,14 +175,17 @@ def _disc_drag(scene: Scene, damping: Damping, omega: float, unit: str) -> Effec
     return Effect("disc_drag", predicted, measured, "1/s", len(damping.best.law.parameters) > 1, why)
 
 
-def _backbone(fitted: Oscillation) -> Effect:
-    name, backbone = "amplitude_dependent_frequency", fitted.phase.backbone
-    if backbone is None:
+def _bend(fitted: Oscillation) -> Effect:
+    name, bend, shift = "amplitude_dependent_frequency", fitted.phase.bend, fitted.shift
+    if bend is None:
         return Effect(name, None, None, "1", False, "a constant frequency describes the phase: an ideal spring's")
-    _, shift = fitted.first_shift(backbone.value)
+    if not fitted.phase.of_amplitude:
+        or_amplitude = "or with the amplitude" if bend.by_amplitude else "and not with the amplitude"
+        why = f"the phase bends: the frequency shifts by {shift:.2g} of itself during the run, with time {or_amplitude}"
+        return Effect(name, None, None, "1", False, why)
     why = (
         f"the phase bends: the frequency shifts by {shift:.2g} of itself from rest to the first amplitude, "
-        "with the square of the amplitude, far beyond its uncertainty"
+        "far beyond its uncertainty"
     )
     return Effect(name, None, shift, "1", True, why)
 

@@ -54,7 +54,8 @@ FORMULAS: Mapping[str, ResultFormula] = {
     ),
     "period_small_swings": ResultFormula(
         lambda small_frequency: 2 * math.pi / small_frequency,
-        "T_s = 2π/ω_s, of very small swings, where the frequency depends on the amplitude",
+        "T_s = 2π/ω_s, of very small swings: ω of the law of the amplitude that fits the phases best, at A = 0. u "
+        "includes the largest difference to the laws that fit about as well. Absent if no law of the amplitude does",
     ),
     "frequency": ResultFormula(lambda angular_frequency: angular_frequency / (2 * math.pi), "f = ω/2π"),
     "angular_frequency": ResultFormula(
@@ -109,11 +110,14 @@ FORMULAS: Mapping[str, ResultFormula] = {
         "decays",
     ),
     "spring_constant": ResultFormula(
-        lambda squared_natural_frequency, effective_mass_kg: squared_natural_frequency * effective_mass_kg,
+        lambda squared_natural_frequency, effective_mass_kg, stiffness_factor=1.0: (
+            squared_natural_frequency * effective_mass_kg * stiffness_factor
+        ),
         "k = ω₀² m_s/x² with x tan x = m_s/(m + m_a); for a light spring k = ω₀² (m + m_a + m_s/3). ω₀ is that "
         "of the undamped motion, m the mass of the bob, m_s that of the spring, and m_a = (8/3) ρ a³ that of "
         "the air moved by a disc of radius a. m_a and m_s are included if their effect exceeds a tenth of k's "
-        "relative uncertainty",
+        "relative uncertainty. ω is the mean over the run; where the frequency changes, u includes the difference to "
+        "that of very small swings or at the start",
         "of_spring",
     ),
     "keulegan_carpenter_number": ResultFormula(

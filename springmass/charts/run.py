@@ -123,7 +123,7 @@ def model_motion(motion: Oscillation, t: F8) -> tuple[F8, F8]:
     law, angle = motion.damping.best, motion.phase.total(t)
     amplitude = law.amplitude(t - motion.phase.t0)
     cosine, sine = np.cos(angle), np.sin(angle)
-    velocity = law.law.rate(amplitude, law.joint.values) * cosine - amplitude * motion.phase.rate(amplitude) * sine
+    velocity = law.law.rate(amplitude, law.joint.values) * cosine - amplitude * motion.phase.rate(amplitude, t) * sine
     return amplitude * cosine, velocity
 
 
@@ -185,6 +185,13 @@ def _law_lines(a: Analysis, laws: Sequence[str] | None) -> list[Series]:
     return lines
 
 
+_MODELS = {
+    "constant": "model: one frequency",
+    "amplitude": "model: the frequency depends on the amplitude",
+    "time": "model: the frequency changes with time",
+}
+
+
 def frequency(a: Analysis) -> Chart | None:
     """Frequency of stretches of the run against their amplitude, with the model of the phase.
 
@@ -207,15 +214,15 @@ def frequency(a: Analysis) -> Chart | None:
         points.append((float(np.mean(windows.amplitude[part])), slope, covariance[0, 0] ** 0.5))
     size, slope, u = np.array(sorted(points), np.float64).T
     factor, mean = RECORDED_UNITS[a.track.unit].factor, phase.angular_frequency.value
-    grid = np.linspace(float(size[0]), float(size[-1]), 100)
     shift = 1e3 / (2.0 * np.pi)
-    changes = phase.backbone is not None
-    model = "model: the frequency depends on the amplitude" if changes else "model: one frequency"
-    law = line_of(model, grid * factor, shift * (phase.rate(grid) - mean))
+    by = "constant" if phase.bend is None else phase.bend.law.by
+    grid = np.linspace(float(windows.t[order[0]]), float(windows.t[order[-1]]), 100)
+    reach = np.clip(motion.damping.best.amplitude(grid - phase.t0), float(size[0]), float(size[-1]))
+    law = line_of(_MODELS[by], reach * factor, shift * (phase.rate(reach, grid) - mean))
     stretches = Series("a stretch of the run", size * factor, shift * (slope - mean), u=shift * u)
     label = f"(frequency − {mean / (2.0 * np.pi):.5g} Hz) / mHz"
     panel = Panel(label, (law, stretches), x_label=value_label("amplitude", a.track.unit))
-    behaviour = "changes" if changes else "is constant"
+    behaviour = "is constant" if phase.bend is None else "changes"
     caption = f"Frequency of stretches of the run ± u; in the fitted model it {behaviour}."
     return Chart("frequency", "Frequency against amplitude", caption, (panel,))
 

@@ -8,7 +8,7 @@ import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -25,7 +25,7 @@ from springmass.commands.options import (
     Strict,
 )
 from springmass.commands.parameters import Share, argument, option, output
-from springmass.comparing.comparison import SpringComparison, compare_runs, comparison_json, line_and_hooke_words
+from springmass.comparing.comparison import SpringComparison, compare_runs, comparison_json, comparison_words
 from springmass.course.results_csv import COURSE, is_course, read_rows
 from springmass.errors import HINT, LOG, OK, REJECTED, ProgramError
 from springmass.loading.save import now_utc
@@ -57,6 +57,7 @@ class CompareOptions:
     ] = None
     output: Annotated[FileArgument | None, output("DIR", "folder for a report (default: write no report)")] = None
     figures: FiguresOption = ()
+    template: Annotated[Literal["latex"] | None, option("KIND", "also write a lab report template: latex")] = None
     json: Json = False
     strict: Strict = False
 
@@ -82,7 +83,7 @@ def compare(
             f"compare needs two runs at least, got {len(inputs)}", "springmass analyse takes a single one"
         )
     if options.output is None:
-        given.refuse("without -o", "--figures")
+        given.refuse("without -o", "--figures", "--template")
     # Scenes are read first, so that their errors are found before an hour of recordings is read.
     scenes = read_scenes(options.scene, len(inputs))
     out = None if options.output is None else make_folder(options.output)
@@ -100,7 +101,9 @@ def compare(
     if out is not None:
         from springmass.report.write import write_report
 
-        page = write_report(out, runs, compared=compared, summary=result, figures=options.figures)
+        page = write_report(
+            out, runs, compared=compared, summary=result, figures=options.figures, template=options.template
+        )
         LOG.info(f"report: {page}")
         LOG.log(HINT, f"open {page} in a browser")
     else:
@@ -139,7 +142,7 @@ def _print_text(compared: SpringComparison, runs: list[Run]) -> None:
 
     text = comparison_text(compared.comparison, [run.analysis for run in runs], style_of(sys.stdout))
     print(*law_lines(runs), text, sep="\n")
-    for message in (*line_and_hooke_words(compared), *(joint.message for joint in compared.joint)):
+    for message in (*comparison_words(compared), *(joint.message for joint in compared.joint)):
         print(f"\n{wrapped(message)}")
     if compared.reported:
         mistakes = [plain(f) for f in compared.findings if "reported" in kinds()[f.code].about]

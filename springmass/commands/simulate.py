@@ -27,11 +27,12 @@ from springmass.simulations.simulation import (
     Simulation,
     SimulationOptions,
     UnstableStep,
+    beside_measured,
     prediction,
     simulated,
     summary,
 )
-from springmass.terminal.printing import wrapped
+from springmass.terminal.printing import aligned, wrapped
 
 
 def simulate(
@@ -121,6 +122,10 @@ def _described(simulation: Simulation, *, given: bool) -> str:
     if (over := simulation.against) is not None:
         left = f"rms {over.rms_m * 1e3:.3g} mm, noise of a sample {over.noise_m * 1e3:.3g} mm"
         lines += [f"against the run  {left}", *deviation_text(over)]
+        rows = [("", "predicted", "measured", "difference / u")]
+        for row in beside_measured(simulation):
+            rows.append((row.quantity.label, f"{row.value:.6g}", str(row.measured), f"{row.apart:+.1f}"))
+        lines += ["", aligned(rows)] if len(rows) > 1 else []
     return "\n".join(lines)
 
 

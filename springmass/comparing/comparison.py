@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -121,10 +122,41 @@ def compare_runs(
     return SpringComparison(comparison, joint, findings, {run.name: run for run in runs}, judged, line, hooke)
 
 
-def line_and_hooke_words(compared: SpringComparison) -> list[str]:
-    """Return a sentence on the line through the squared periods, and one on Hooke's law."""
-    line, static = compared.line, compared.hooke
+MOST_PERIODS = 3  # runs whose period is explained
+
+
+def _period_words(compared: SpringComparison) -> list[str]:
+    """Return why each period is longer than the shortest: by the mass that swings, and by damping.
+
+    With :math:`T = 2\\pi/\\omega` and :math:`\\omega_0^2 = k/M`, the ratio of two periods on one spring is that of the
+    roots of M times that of :math:`\\omega_0/\\omega`, which is :math:`1 + 1/8Q^2` for linear drag.
+    """
+    moved = [(run.name, run["period"].value, run.analysis.derived) for run in compared.runs.values()]
+    swinging = {name: (t, d.effective_mass_kg.value, d) for name, t, d in moved if d.effective_mass_kg is not None}
+    if len(swinging) < len(moved) or not compared.comparison.agree:  # then the masses are not the reason
+        return []
+    slowed = {
+        name: math.sqrt(d.estimates["spring_constant"].value / mass) * t / (2.0 * math.pi)
+        for name, (t, mass, d) in swinging.items()
+    }
+    first, *others = sorted(swinging, key=lambda name: swinging[name][0])
+    t, mass, _ = swinging[first]
     lines = []
+    for name in others[-MOST_PERIODS:]:
+        longer, heavier = swinging[name][0] / t - 1.0, math.sqrt(swinging[name][1] / mass) - 1.0
+        damped = 1e6 * (slowed[name] / slowed[first] - 1.0)
+        lines.append(
+            f"The period of {name} is {100.0 * longer:.3g} % longer than that of {first}: the masses that swing, "
+            f"{1e3 * swinging[name][1]:.5g} g and {1e3 * mass:.5g} g, explain {100.0 * heavier:+.3g} %, damping "
+            f"{damped:+.2g} ppm."
+        )
+    return lines
+
+
+def comparison_words(compared: SpringComparison) -> list[str]:
+    """Return why the periods differ, and what the line through their squares and Hooke's law give, in sentences."""
+    line, static = compared.line, compared.hooke
+    lines = _period_words(compared)
     if line is not None:
         grams = Estimate(1e3 * line.effective_mass.value, 1e3 * line.effective_mass.u, "g")
         lines.append(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import functools
 import hashlib
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,23 +14,24 @@ from typing import TYPE_CHECKING, Any
 from acquisition.errors import visible
 from pipeline.findings.finding import kinds
 from pipeline.numerics.estimate import Estimate
-from pipeline.quantities import EFFECTS, INPUTS
+from pipeline.quantities import EFFECTS, INPUTS, QUANTITIES
 from pipeline.track import Track
 from springmass.charts.browser import chart_style, report_source
 from springmass.charts.chart import Chart, to_json
-from springmass.comparing.comparison import SpringComparison, line_and_hooke_words
+from springmass.comparing.comparison import SpringComparison, comparison_words
 from springmass.report.recorded import bench_words, calibration_of, date_words, notes_of
 from springmass.report.words import method, summary
-from springmass.result.advice import notices_of
+from springmass.result.advice import SEVERITY_WORDS, notices_of
 from springmass.result.budget_tables import budgets_of
 from springmass.result.grades import all_sound, grades_of, leaves_more_than_noise
 from springmass.result.law_rows import laws_across, laws_of
 from springmass.result.table1 import rows_and_needs, table_rows
 from springmass.runs.run import Run
-from springmass.typeset import cells, page_unit, prefixed, pretty, pretty_number, typeset
+from springmass.typeset import MANY_FREEDOM, cells, count, page_unit, prefixed, pretty, pretty_number, typeset
 
 if TYPE_CHECKING:
     from jinja2 import Template
+    from markupsafe import Markup
 
 _QUALITY = {
     "used": "used",
@@ -97,12 +99,15 @@ def render_html(
         several=overview,
         compared=compared,
         of_reported={code for code, kind in kinds().items() if "reported" in kind.about},
+        reported="" if compared is None else _reported_words(compared),
+        periods={run.name: (run["period"], run.analysis.derived.effective_mass_kg) for run in runs if run.ok},
         verdict=""
         if compared is None
-        else typeset(" ".join([compared.comparison.message, *line_and_hooke_words(compared)])),
+        else typeset(" ".join([compared.comparison.message, *comparison_words(compared)])),
         joint=() if compared is None else [laws_across(joint) for joint in compared.joint],
         provenance=list(_flattened(provenance)),
         version=provenance["version"],
+        many=MANY_FREEDOM,
         **drawn_by_script(figures.charts, script),
     )
 
@@ -152,8 +157,34 @@ def template(name: str) -> Template:
         "effect": EFFECTS.__getitem__,
         "unit": page_unit,
         "typeset": typeset,
+        "indexed": _indexed,
+        "word": SEVERITY_WORDS.__getitem__,
     }
     return environment.get_template(name)
+
+
+def _reported_words(compared: SpringComparison) -> str:
+    """Return how many of the values that somebody printed agree, and which mistakes explain the others."""
+    if not compared.reported:
+        return ""
+    agree = sum(row.verdict == "agrees" for row in compared.reported)
+    mistakes = [f for f in compared.findings if "reported" in kinds()[f.code].about]
+    errors = [typeset(f.message) for f in mistakes if f.severity == "error"]
+    text = " ".join([f"{agree} of {count(len(compared.reported), 'printed value')} agree.", *errors])
+    return f"{text} {count(len(mistakes) - len(errors), 'warning')} below." if len(mistakes) > len(errors) else text
+
+
+_INDEXES = [q.page_symbol.replace(" ", "_") for q in QUANTITIES.values() if " " in q.page_symbol]
+_SYMBOL_WITH_INDEX = re.compile(rf"\b({'|'.join(_INDEXES)})\b")
+
+
+def _indexed(text: str) -> Markup:
+    """Set the indexes of symbols lower in a sentence, as in T_s."""
+    from markupsafe import Markup, escape
+
+    return Markup(
+        _SYMBOL_WITH_INDEX.sub(lambda found: "{}<sub>{}</sub>".format(*found[0].split("_")), str(escape(visible(text))))
+    )
 
 
 def tables_of(runs: Sequence[Run]) -> Iterator[dict[str, Any]]:

@@ -14,7 +14,7 @@ from pipeline.simulation.band import LEVELS, Band
 from pipeline.track import F8
 from springmass.result.output_names import in_a_name, make_folder
 from springmass.simulations.run_files import write_states
-from springmass.simulations.simulation import Simulation, summary
+from springmass.simulations.simulation import Simulation, beside_measured, summary
 
 if TYPE_CHECKING:
     from springmass.charts.draw import PictureFormat
@@ -48,7 +48,10 @@ def write(out: str | Path, simulation: Simulation, figures: Sequence[PictureForm
         write_states(folder / "run.h5", simulation, title)
         drawn = Figures(save(charts, make_folder(folder / "figures"), figures) if figures else {})
         shown = [drawn.add(chart) for chart in charts]
-        page = template("charts.html.j2").render(title=title, figures=shown, **drawn_by_script(drawn.charts))
+        beside = beside_measured(simulation)
+        page = template("charts.html.j2").render(
+            title=title, figures=shown, beside=beside, **drawn_by_script(drawn.charts)
+        )
         write_whole(folder / SIMULATION_PAGE, page)
         for table_name, table in tables.items():
             write_whole(folder / f"{table_name}.csv", _table(table))

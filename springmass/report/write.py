@@ -13,19 +13,19 @@ from springmass.charts.chart import Chart
 from springmass.charts.draw import PictureFormat, save
 from springmass.charts.run import CHARTS, charts_of
 from springmass.charts.several import comparison, masses, overlay, static
-from springmass.comparing.comparison import SpringComparison
+from springmass.comparing.comparison import SpringComparison, comparison_words
 from springmass.errors import LOG
 from springmass.report.html import render_html
 from springmass.report.latex import budget_tex, lab_report_tex, table_tex
 from springmass.report.motion_table import amplitude_csv, motion_csv
 from springmass.report.recorded import notes_of
-from springmass.report.words import summary as in_words
 from springmass.result.budget_tables import budget_csv
 from springmass.result.frames import smoothed_or_why
 from springmass.result.output_names import safe_name
 from springmass.result.run_json import plain
 from springmass.result.table1 import results_csv
 from springmass.runs.run import Run
+from springmass.typeset import typeset
 from storage.atomic import remove_files, whole_folder, write_whole
 
 REPORT_PAGE = "report.html"
@@ -107,9 +107,16 @@ def write_report(
         )
         write_whole(folder / REPORT_PAGE, page)
         if template is not None:
-            captions = {name: charts[0][name].caption for name in OF_LAB_REPORT if name in charts[0]}
-            sentences = [text for title, text in in_words(analyses[0]) if title != "What to do"]
-            write_whole(folder / LAB_REPORT, lab_report_tex(runs[0], captions, sentences))
+            captions = [
+                {f"{stem}{name}": of_run[name].caption for name in OF_LAB_REPORT if name in of_run}
+                for stem, of_run in zip(stems, charts, strict=True)
+            ]
+            sentences = (
+                []
+                if compared is None
+                else [typeset(x) for x in (compared.comparison.message, *comparison_words(compared))]
+            )
+            write_whole(folder / LAB_REPORT, lab_report_tex(runs, captions, sentences))
     LOG.debug(f"written: {directory}: {', '.join(sorted(each.name for each in directory.iterdir()))}")
     return directory / REPORT_PAGE
 

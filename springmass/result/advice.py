@@ -9,7 +9,7 @@ from typing import Any
 from pipeline.findings.finding import kinds
 from springmass.typeset import typeset
 
-_WORDS = {"error": "Error", "warning": "Warning", "info": "Note"}
+SEVERITY_WORDS = {"error": "Error", "warning": "Warning", "info": "Note"}
 
 
 class Harm(enum.IntEnum):
@@ -72,7 +72,7 @@ def notices_of(findings: Iterable[Mapping[str, Any]], figures: Container[str]) -
         notice = {
             "code": finding["code"],
             "severity": finding["severity"],
-            "word": _WORDS[finding["severity"]],
+            "word": SEVERITY_WORDS[finding["severity"]],
             "message": sentence(typeset(finding["message"])),
             "advice": "" if is_note else finding["advice"],
             "details": typeset(finding.get("details", "")),

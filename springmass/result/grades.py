@@ -50,14 +50,12 @@ class Graded:
 
 
 def grades_of(analysis: Analysis) -> dict[str, Graded]:
-    """Return the grades of all estimates and coefficients by name; empty if nothing oscillates.
+    """Return the grades of all estimates and coefficients by name, of whatever motion.
 
     A number is uncertain if a finding doubts a part of the model that it comes from, or if fewer than two of its digits
     are certain. It is not to be quoted if an error concerns it, if zero is within two standard uncertainties, or if the
     recording contradicts the law that was stated for it.
     """
-    if not analysis.damping.fits:
-        return {}
     every = numbers_of(analysis)
     doubts = [(finding, doubted_by(finding)) for finding in analysis.findings]
     return {
@@ -70,9 +68,9 @@ def doubted_by(finding: Finding) -> frozenset[str]:
     """Return the parts of the model that a finding doubts; an error doubts all of them unless it names some."""
     kind = kinds()[finding.code]
     small = any(abs(finding.values.get(name, 0.0)) <= size for name, size in kind.doubts_above.items())
-    if finding.severity == "info" or small:
+    if finding.severity == "info":
         return frozenset()
-    named = kind.doubts or ("everything",) * (finding.severity == "error")
+    named = kind.doubts_anyway if small else kind.doubts or ("everything",) * (finding.severity == "error")
     return frozenset(MODEL_PARTS if "everything" in named else named)
 
 
@@ -98,7 +96,7 @@ def _sized(analysis: Analysis, name: str, x: Estimate) -> Iterator[Reason]:
     if isinstance(x, UpperLimit):
         yield Reason("sound", "upper_limit", "as an upper limit")
     elif name not in ("phase", "offset", "noise") and x.u > UNCERTAIN * abs(x.value):
-        greatest = analysis.budgets[name].contributions[0].name
+        greatest = analysis.derived.budgets[name].contributions[0].name
         label = INPUTS[greatest].label
         if x.u > MEANINGLESS * abs(x.value):
             share = f"u is {100.0 * x.u / abs(x.value):.0f} % of it: " if x.value else ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from pipeline.analyse import Analysis
@@ -17,8 +17,7 @@ def laws_of(analysis: Analysis) -> dict[str, Any]:
     """Return the rows of all laws fitted to one run, and the reasons why other laws were not fitted."""
     damping = analysis.damping
     fitted = {law: analysis.derived.parameters_of(fit) for law, fit in damping.fits.items()}
-    laws = _laws(damping, fitted, lambda law: law_status(damping, law))
-    return {**laws, "unfitted": [(law, typeset(why)) for law, why in damping.unfitted.items()]}
+    return {**_laws(damping, fitted), "unfitted": [(law, typeset(why)) for law, why in damping.unfitted.items()]}
 
 
 def laws_across(joint: JointDamping) -> dict[str, Any]:
@@ -27,18 +26,16 @@ def laws_across(joint: JointDamping) -> dict[str, Any]:
     return {
         "message": typeset(joint.message),
         "unfitted": [],
-        **_laws(joint, fitted, lambda law: _joint_status(joint, law)),
+        **_laws(joint, fitted),
     }
 
 
-def _laws(
-    damping: Damping | JointDamping, fitted: Mapping[str, Mapping[str, Estimate]], status: Callable[[str], str]
-) -> dict[str, Any]:
+def _laws(damping: Damping | JointDamping, fitted: Mapping[str, Mapping[str, Estimate]]) -> dict[str, Any]:
     """Return one row per fitted law: goodness of fit, status and coefficients."""
     rows = [
         {
             "name": law,
-            "status": status(law),
+            "status": law_status(damping, law),
             "look": "rejected" if fit.rejected else "selected" if law == damping.selected else "",
             "fit": fit,
             "chi2": _difference(fit.reduced_chi2 * fit.dof - damping.best.reduced_chi2 * damping.best.dof),
@@ -54,12 +51,3 @@ def _difference(value: float) -> str:
     if not math.isfinite(value):  # chi-square of a law with as many parameters as there are windows
         return pretty_number(None)
     return pretty_number(value) if abs(value) >= 1000.0 else f"{value:.1f}".replace("-", "−")
-
-
-def _joint_status(joint: JointDamping, law: str) -> str:
-    rejection = joint.fits[law].rejection
-    if rejection:
-        return {"differ": "coefficients differ"}.get(rejection, rejection)
-    if law == joint.selected:
-        return "selected"
-    return "admissible" if law in joint.admissible else "unlikely"

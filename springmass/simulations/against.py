@@ -39,6 +39,7 @@ class Against:
     """A measured run with a prediction laid over it, at the samples used (n,), in s and m.
 
     ``free`` has the times since the first sample, the displacements and the fitted velocities without false echoes.
+    ``estimates`` are the results of the run.
     ``band`` has the quantiles (4, n) of the predicted distance relative to ``predicted``; ``inside`` is the share of
     the samples within its 95 % widened by the noise, and ``leaves_band_s`` the time from which the run leaves it.
     """
@@ -49,6 +50,7 @@ class Against:
     rms_m: float
     noise_m: float
     free: tuple[F8, F8, F8]
+    estimates: Mapping[str, Estimate]
     band: F8 | None = None
     inside: float | None = None
     leaves_band_s: float | None = None
@@ -83,14 +85,14 @@ def compare_with_run(
     rms = float(np.sqrt(np.mean((measured - predicted) ** 2)))
     noise = analysis.estimates["noise"].value
     if band is None:
-        return Against(t, measured, predicted, rms, noise, free)
+        return Against(t, measured, predicted, rms, noise, free, analysis.estimates)
     around = band.displacement_at(t - t[0])
     left = measured - predicted
     outside = (left < around[0] - WIDER * noise) | (left > around[3] + WIDER * noise)
     shifts = _shifts(band, t - t[0], left, values)
     inside = 1.0 - float(np.mean(outside))
     leaves_band_s = _leaves(t, outside, trajectory.problem)
-    return Against(t, measured, predicted, rms, noise, free, around, inside, leaves_band_s, shifts)
+    return Against(t, measured, predicted, rms, noise, free, analysis.estimates, around, inside, leaves_band_s, shifts)
 
 
 def _leaves(t: F8, outside: NDArray[np.bool_], problem: Problem) -> float | None:

@@ -6,7 +6,7 @@ import math
 import time
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from pipeline.bench.scene import Scene
 from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError
 from pipeline.numerics.estimate import Estimate, Joint
+from pipeline.quantities import QUANTITIES, Quantity
 from pipeline.results.effects import Effect, simulated_effects
 from pipeline.simulation import Integrator, Problem, Trajectory, get_integrator
 from pipeline.simulation.band import STRONGEST, Band, spread, uncertain
@@ -380,6 +381,36 @@ def prediction(solved: Simulation) -> dict[str, float | None] | None:
         "amplitude_m": start,
         "last_amplitude_m": _last_amplitude(solved),
     }
+
+
+class Predicted(NamedTuple):
+    """A result of a run beside its prediction; ``apart`` is the difference over u of the run's."""
+
+    quantity: Quantity
+    value: float
+    measured: Estimate
+    apart: float
+
+
+_PREDICTED = {
+    "period": "period_s",
+    "damping_rate": "damping_rate_per_s",
+    "quality_factor": "quality_factor",
+    "amplitude": "amplitude_m",
+}
+
+
+def beside_measured(solved: Simulation) -> list[Predicted]:
+    """Return the results of the run that the simulation is compared with, beside their predictions."""
+    values = prediction(solved)
+    if solved.against is None or values is None:
+        return []
+    rows = []
+    for name, key in _PREDICTED.items():
+        value, measured = values[key], solved.against.estimates.get(name)
+        if value is not None and measured is not None and measured.u > 0.0:
+            rows.append(Predicted(QUANTITIES[name], value, measured, (measured.value - value) / measured.u))
+    return rows
 
 
 def _last_amplitude(solved: Simulation) -> float:

@@ -97,6 +97,7 @@ SHOWN: dict[str, Shown] = {
         "--hooke": ("hooke.csv",),
         "--output": ("out",),
         "--figures": ("svg", f"{ANY_COMPARE} -o out"),
+        "--template": ("latex", f"{ANY_COMPARE} -o out"),
         "--json": ("", ANY_COMPARE),
         "--strict": (
             "",
@@ -237,7 +238,7 @@ WITHOUT = {
     "analyse short.txt --no-report": ("--template", "--figures"),
     "analyse short.txt --json": ("--template", "--figures", "--full", "--si"),
     "analyse short.txt other.txt --no-report": ("--template", "--figures", "--full", "--velocity"),
-    "compare short.txt other.txt": ("--figures",),
+    "compare short.txt other.txt": ("--figures", "--template"),
     "convert short.txt out.csv": ("--scene",),
     "simulate --scene bench.toml --json": ("--read", "--sensor", "--seed", "--overwrite", "--figures"),
     "page base.wire": ("--read",),

@@ -164,7 +164,7 @@ def test_the_server_ends_when_its_pages_are_gone(tmp_path: Path, monkeypatch: py
 
 
 def test_a_window_that_was_killed_is_offered_for_a_day(tmp_path: Path) -> None:
-    """With its answers and its bench, and then without any trace; a living window's cards are left alone."""
+    """With its answers and notes, and then no trace is left; another window lives on; a named file is opened."""
     windows = tmp_path / "state" / "springmass" / "window"
     with started(tmp_path / "x", "page") as program:
         first = WindowClient(program.address)
@@ -193,6 +193,7 @@ def test_a_window_that_was_killed_is_offered_for_a_day(tmp_path: Path) -> None:
     day_ago = time.time() - 25 * 3600.0
     for path in windows.iterdir():
         os.utime(path, (day_ago, day_ago))
-    with started(tmp_path / "x", "page") as program:
-        WindowClient(program.address).cards()
+    with started(tmp_path / "x", "page", str(springmass.sample_data() / "undamped_simulated_position.txt")) as program:
+        (card,) = WindowClient(program.address).cards()
+        assert (card["name"], card["stage"]) == ("undamped_simulated_position.txt", "done")
         assert not any(path.suffix == ".xlsx" for path in windows.rglob("*"))

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+import springmass
 from tests.pages.conftest import started
 from tests.pages.window import WindowClient, pair, tracker
 
@@ -112,3 +113,19 @@ def test_what_is_dropped_is_for_its_user_alone(client: tuple[WindowClient, Path]
     for card in cards:
         assert window.do("remove", card=card["id"])[0] == 200
     assert not any(path.is_file() for path in folder.rglob("files-*/*"))
+
+
+def test_a_scene_is_dropped_too(client: tuple[WindowClient, Path]) -> None:
+    """It fills the form of the recordings that fell with it, in the units of the form; two scenes are refused."""
+    window, _ = client
+    data = springmass.sample_data()
+    scenes = {name: (data / name).read_bytes() for name in ("damped.scene.toml", "undamped.scene.toml")}
+    assert window.drop({**pair(), "damped.scene.toml": scenes["damped.scene.toml"]}, "scene")[0] == 200
+    (card,) = window.cards()
+    shown = {field["name"]: (field["text"], field.get("u"), field.get("unit")) for field in card["form"]}
+    assert shown["bob.mass_kg"] == ("217.6", "0.05", "g")
+    assert shown["disc.diameter_m"] == ("10.2", "0.05", "cm")
+    assert shown["sensor.position"] == ("below", None, None)
+    status, said = window.drop(scenes, "scenes")
+    assert (status, said["refused"].count("2 scenes were dropped")) == (409, 1)
+    window.do("remove", card=card["id"])

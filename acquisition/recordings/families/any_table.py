@@ -24,7 +24,7 @@ import numpy as np
 from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.tables.blocks import FEWEST_ROWS
 from acquisition.recordings.tables.format import text_format
-from acquisition.recordings.tables.headings import Heading, headings_of, is_time, split_heading
+from acquisition.recordings.tables.headings import Heading, headings_of, is_time, role_of, split_heading
 from acquisition.recordings.tables.layout import (
     are_named_times,
     are_row_numbers,
@@ -225,16 +225,14 @@ def _with_units_apart(text: Text) -> Text:
 
 def _blocks(text: Text, first: Header) -> Iterator[tuple[int, Header]]:
     """Yield where the names of a table without times come again; then each block is a run."""
-    if not first.named or first.formula is not None or any(each.role == "time" for each in first.headings):
+    if not first.named or first.formula is not None or any(role_of(each) == "time" for each in first.headings):
         return
     names = next(line for line in reversed(text.lines(0, first.lines)) if line.strip())
-    begins, row = [], first.lines
-    while (at := text.find(f"\n{names}\n".encode(), row)) is not None:
-        begins.append((text.words_above(row, at + 1), at + 2))
-        row = at + 2
-    if begins and (row - first.lines) / len(begins) >= FEWEST_ROWS:
-        for number, (begin, rows) in enumerate(begins, 2):
-            yield begin, replace(first, lines=rows - begin, run=f"Part {number}", traps=())
+    again = list(text.matching(re.compile(b"^%s$" % re.escape(names.encode()), re.MULTILINE), first.lines))
+    if again and again[-1] - first.lines >= FEWEST_ROWS * len(again):
+        for number, at in enumerate(again, 2):
+            begin = text.words_above(first.lines, at)
+            yield begin, replace(first, lines=at + 1 - begin, run=f"Part {number}", traps=())
 
 
 def _width(line: str, mark: str) -> int:

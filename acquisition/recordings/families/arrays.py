@@ -126,9 +126,7 @@ def _tables(path: str, data: bytes) -> list[Table]:
     if not tables or not any(table.columns for table in tables):
         raise FormatError(path, "expected arrays of numbers, times and values, got none", _REMEDY)
     simulated = "simulated" if b"simulated" in data[: 1 << 16] else ""
-    return [
-        Table(each.columns, each.times, beside=each.beside, title=simulated) for each in timed or tables if each.columns
-    ]
+    return [replace(each, title=simulated) for each in timed or tables if each.columns]
 
 
 def _table(columns: list[tuple[Heading, Any]]) -> Table:

@@ -19,6 +19,7 @@ from acquisition.recordings.tables.table import Header
 from acquisition.recordings.tables.text import Text
 from acquisition.recordings.tables.times import clock_s, duration_s
 
+_INTERVAL = re.compile(rb"^Interval=", re.MULTILINE)
 _SAMPLING = re.compile(r"([\d.,]+ \w+)/sample\s*", re.IGNORECASE)
 _CHANNELS = re.compile(r"(\d{1,3}) channels\s*", re.IGNORECASE)
 
@@ -44,9 +45,7 @@ def labchart(lines: Sequence[str]) -> Header | None:
 
 
 def _blocks(text: Text, first: Header) -> Iterator[tuple[int, Header]]:
-    begin, number = first.lines, 1
-    while (at := text.find(b"\nInterval=", begin)) is not None:
-        begin, number = at + 1, number + 1
+    for number, begin in enumerate(text.matching(_INTERVAL, first.lines), 2):
         if (header := labchart(text.lines(begin, 40))) is not None:
             yield begin, replace(header, run=f"Block {number}")
 

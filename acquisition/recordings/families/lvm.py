@@ -36,6 +36,7 @@ from acquisition.recordings.tables.text import Text, decode, is_text, text_of
 
 _MAGIC = "LabVIEW Measurement"
 _END = "***End_of_Header***"
+_END_MARK = re.compile(re.escape(_END).encode())
 _SEPARATOR = "Separator"
 _MOST_HEADER_LINES = 500
 _MOST_SEGMENTS = 10_000
@@ -105,7 +106,7 @@ def _segments(path: str, text: Text, top: _Header, mark: str) -> Iterator[tuple[
     start = top.next
     for _ in range(_MOST_SEGMENTS):
         header = _header(path, text, start, mark)
-        end = text.find(_END.encode(), header.next)
+        end = next(text.matching(_END_MARK, header.next), None)
         if end is None:
             yield header, len(text)
             return

@@ -22,7 +22,7 @@ from acquisition.recordings.tables.vocabulary import MOTION
 
 _CAPSTONE = re.compile(r"(?P<quantity>.*\S)\s+(?P<run>\S+ #\s?\d+|Run \d+)")
 _DATASTUDIO = re.compile(r"(?P<name>[^\t;]+), (?P<run>\S+ #\s?\d+)\s*")
-_DATASTUDIO_LINE = re.compile(rb"\n([^\t;\n]+, [^\s]+ #[ \t]?\d+[ \t]*)(?=\n)")
+_DATASTUDIO_LINE = re.compile(rb"^[^\t;\n]+, [^\s]+ #[ \t]?\d+[ \t]*$", re.MULTILINE)
 
 
 def capstone(lines: Sequence[str]) -> Header | None:
@@ -56,9 +56,7 @@ def datastudio(lines: Sequence[str]) -> Header | None:
 
 def _datastudio_runs(text: Text, first: Header) -> Iterator[tuple[int, Header]]:
     """Yield the two lines above each further run."""
-    del first
-    for match in _DATASTUDIO_LINE.finditer(text.data):
-        begin = text.at(match.start(1))
+    for begin in text.matching(_DATASTUDIO_LINE, first.lines):
         if (header := datastudio(text.lines(begin, 2))) is not None:
             yield begin, header
 

@@ -88,8 +88,7 @@ def _vernier_headings(lines: Sequence[str]) -> list[Heading]:
     if len(lines) == 1:
         return headings_of(names)
     units = [cell.strip().strip("()") for cell in lines[-1].split("\t")]
-    units += [""] * (len(names) - len(units))
-    return [Heading(name, unit) for name, unit in zip(names, units, strict=False)]
+    return [Heading(name, unit) for name, unit in zip(names, [*units, *[""] * len(names)], strict=False)]
 
 
 def _vernier_sets(text: Text, first: Header) -> Iterator[tuple[int, Header]]:
@@ -98,17 +97,17 @@ def _vernier_sets(text: Text, first: Header) -> Iterator[tuple[int, Header]]:
     if not names:
         return
     long_names = names[1 if first.run and len(names) > 1 else 0]
-    needle = b"\n" + text.data[text.starts[long_names] : text.starts[long_names + 1]].rstrip(b"\n")
+    line = text.data[text.starts[long_names] : text.starts[long_names + 1]].rstrip(b"\n")
     rows = first.lines
-    while (again := text.find(needle, rows)) is not None:
-        begin = text.words_above(rows, again + 1)
+    for again in text.matching(re.compile(b"^" + re.escape(line), re.MULTILINE), rows):
+        begin = text.words_above(rows, again)
         head = text.head(_MOST_LINES, begin)
         skip = next((at + 2 for at, line in enumerate(head[:_MOST_HEADINGS]) if line.startswith(_FORMAT_2)), 0)
         below = _data_set(head[skip:])
         if begin <= rows or below is None:
             return
         yield begin, Header(first.why, skip + below[1], "\t", below[2], run=below[0])
-        rows = again + 1
+        rows = again
 
 
 def _is_tar(head: bytes) -> bool:

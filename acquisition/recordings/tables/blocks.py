@@ -135,12 +135,8 @@ def _in_unit(column: Column, words: NDArray[np.str_], units: Mapping[str, Measur
     return replace(column, values=values, decimals=forms, words=words if len(units) > 1 else None)
 
 
-def by_label(tables: Sequence[Table]) -> list[Table]:
-    """Return tables in which a column of words that tells rows apart makes channels, each with its own rows."""
-    return [part for table in tables for part in _by_label(table)]
-
-
-def _by_label(table: Table) -> list[Table]:
+def by_label(table: Table) -> list[Table]:
+    """Return a table, or one of each channel if a column of words tells its rows apart."""
     for column in table.beside:
         if column.words is None or table.lines is None or not table.columns:
             continue

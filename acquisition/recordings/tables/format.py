@@ -151,7 +151,7 @@ def _tables(path: str, text: Text, begin: int, header: Header, stop: int) -> lis
     facts = {each.name: getattr(header, each.name) for each in fields(TableFacts)}
     columns, headings = with_units_of_rows(read.columns, header.headings)
     common = replace(read, columns=columns, **{**facts, "traps": (*header.traps, *read.traps)})
-    tables = by_label(side_by_side(common, headings, header.run))
+    tables = [part for table in side_by_side(common, headings, header.run) for part in by_label(table)]
     if not tables:
         raise FormatError(path, "expected a column beside the times, got none", "export what was measured too")
     return tables

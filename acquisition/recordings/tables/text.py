@@ -76,10 +76,9 @@ class Text:
         near = int(np.searchsorted(self.starts[:-1], self.starts[first] + _HEAD_SPAN, side="right"))
         return self.lines(first, min(limit, near - first))
 
-    def find(self, what: bytes, first: int) -> int | None:
-        """Return the first line from line ``first`` on that contains ``what``."""
-        at = self.data.find(what, self.starts[first])
-        return None if at < 0 else self.at(at)
+    def matching(self, pattern: re.Pattern[bytes], first: int) -> Iterator[int]:
+        """Yield the lines from line ``first`` on in which a pattern matches."""
+        yield from (self.at(match.start()) for match in pattern.finditer(self.data, self.starts[first]))
 
     def at(self, position: int) -> int:
         """Return the line of a byte."""

@@ -143,8 +143,8 @@ class Panel {
     if (more.bare) Object.assign(x, { label: null, labelSize: 0, size: 8 * k, values: (_, splits) => splits.map(() => "") });
     if (panel.names && panel.names.length) {
       const count = panel.names.length, room = this.size().width / k - 90, longest = Math.max(...panel.names.map((name) => name.length));
-      const every = Math.ceil(((8 * longest + 10) * count) / room), shown = panel.names.map((_, i) => i + 1).filter((v) => (v - 1) % every === 0);
-      Object.assign(x, { splits: () => shown, values: (_, at) => at.map((v) => panel.names[v - 1]) });
+      const fit = Math.floor(room / count / 8), cut = fit < longest && fit >= 8, every = cut ? 1 : Math.ceil(((8 * longest + 10) * count) / room), shown = panel.names.map((_, i) => i + 1).filter((v) => (v - 1) % every === 0);
+      Object.assign(x, { splits: () => shown, values: (_, at) => at.map((v) => (cut && panel.names[v - 1].length > fit ? `${panel.names[v - 1].slice(0, fit - 1)}…` : panel.names[v - 1])) });
     }
     const log = this.log && { distr: 3 };
     this.plot = new uPlot({

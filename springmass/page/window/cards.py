@@ -97,8 +97,12 @@ class Cards:
             age_s = time.time() - folder.stat().st_mtime
             if age_s <= ALIVE_S:
                 continue
-            cards = [json.loads(path.read_text("utf-8")) for path in folder.glob("*/card.json")]
-            if (names := [card["name"] for card in cards if not card["saved"]]) and age_s <= KEPT_S:
+            try:
+                cards = [json.loads(path.read_text("utf-8")) for path in folder.glob("*/card.json")]
+                names = [card["name"] for card in cards if not card["saved"]]
+            except (OSError, ValueError, LookupError, TypeError):  # nothing that this version could open again
+                names = []
+            if names and age_s <= KEPT_S:
                 found.append({"id": folder.name, "names": names, "age_s": age_s})
             else:
                 shutil.rmtree(folder, ignore_errors=True)

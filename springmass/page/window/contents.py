@@ -11,7 +11,7 @@ from acquisition.recordings.identify import get_format
 from acquisition.recordings.questions import Missing, MissingItem
 from springmass.charts.chart import Chart, to_json
 from springmass.charts.run import charts_of, recording
-from springmass.comparing.comparison import SpringComparison, line_and_hooke_words
+from springmass.comparing.comparison import SpringComparison, comparison_words
 from springmass.comparing.reported import Reported
 from springmass.loading.loaded import Loaded
 from springmass.page.window.bench import FIELDS
@@ -154,7 +154,7 @@ def compared_of(compared: SpringComparison, charts: Mapping[str, Chart]) -> dict
     rows = [[name, pretty(k), f"{pull:+.1f}".replace("-", "−")] for name, k, pull in each]
     if springs.agree:
         rows.append(["weighted mean", pretty(springs.spring_constant), ""])
-    texts = [springs.message, *line_and_hooke_words(compared), *(joint.message for joint in compared.joint)]
+    texts = [springs.message, *comparison_words(compared), *(joint.message for joint in compared.joint)]
     return {
         "verdict": typeset(" ".join(texts)),
         "rows": rows,

@@ -19,6 +19,7 @@ from platformdirs import user_documents_path
 
 from springmass.errors import ProgramError
 from springmass.session.file_names import default_name
+from storage.atomic import write_whole
 
 SIMULATED = "simulate"
 
@@ -87,7 +88,7 @@ class RecorderProcess:
                 command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=log, start_new_session=True
             )
         self.folder, self.run, self._pid, self._shown = str(where), str(run), self._process.pid, False
-        self._kept.write_text(json.dumps({"folder": self.folder, "run": self.run, "pid": self._pid}), "utf-8")
+        write_whole(self._kept, json.dumps({"folder": self.folder, "run": self.run, "pid": self._pid}))
 
     def end(self) -> None:
         """End it as Ctrl-C does: what was recorded becomes a run file."""

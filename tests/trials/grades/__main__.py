@@ -66,7 +66,9 @@ def _disc(_: argparse.Namespace) -> bool:
         values, warnings = disc.values_from(start_s)
         shown = ", ".join(f"{name} = {x}" for name, x in values.items())
         print(f"from {start_s or 0:g} s: {shown}; {', '.join(sorted(warnings)) or 'no warnings'}")
-    apart = list(disc.apart())
+    for start_s, x in disc.small_swings().items():
+        print(f"from {start_s:g} s: T_s = {x.value:.6f} s, u {x.u:.2g} s, {'sound' if x.sound else 'not sound'}")
+    apart = [*disc.apart(), *disc.small_swings_apart()]
     for pair, name, z in apart:
         print(f"{pair} | {name} | {z:+.1f} of the larger u")
     return all(abs(z) <= APART for *_, z in apart)

@@ -28,7 +28,7 @@ CODES: Mapping[str, frozenset[str]] = {
     "scale": frozenset({"not_sinusoidal"}),
     "mirror": frozenset({"not_sinusoidal", "false_echoes"}),
     "backbone": frozenset({"amplitude_dependent_frequency"}),
-    "frequency_drift": frozenset({"amplitude_dependent_frequency"}),
+    "frequency_drift": frozenset({"amplitude_dependent_frequency", "frequency_drift"}),
     "hum": frozenset({"implausible_motion", "no_oscillation"}),
     "hum_and_clip": frozenset({"clipped"}),
     "interleaved": frozenset({"no_oscillation"}),
@@ -87,7 +87,7 @@ class Kind:
     def codes(self) -> frozenset[str]:
         """The findings that name it; a motion that the models describe is to be right, and no finding excuses it."""
         described = self.plain or self.cause == "described"
-        return CODES[self.cause] if described else CODES[self.cause] | {"model_misfit"}
+        return CODES[self.cause] if described else CODES[self.cause] | {"model_misfit", "halves_differ"}
 
 
 def kind(

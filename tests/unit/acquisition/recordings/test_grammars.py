@@ -40,28 +40,20 @@ def holds(recording: Recording, t: np.ndarray = T, x: np.ndarray = X) -> None:
 
 # Numbers
 
-ARABIC = str.maketrans("0123456789.", "٠١٢٣٤٥٦٧٨٩٫")
-PERSIAN = str.maketrans("0123456789.-", "۰۱۲۳۴۵۶۷۸۹٫−")
 FORMS = {
-    "minus sign": lambda x: f"{x:.3f}".replace("-", "−"),
     "en dash": lambda x: f"{x:.3f}".replace("-", "–"),
     "no-break space": lambda x: f"\xa0{x:.3f}",
     "thin space behind": lambda x: f"{x:.3f}\u2009",
-    "accounting": lambda x: f"({-x:.3f})" if x < 0 else f"{x:.3f}",
     "sign behind": lambda x: f"{-x:.3f}-" if x < 0 else f"{x:.3f}",
-    "Arabic": lambda x: f"\u061c{x:.3f}".translate(ARABIC),
-    "Persian": lambda x: f"\u200e{x:.3f}".translate(PERSIAN),
-    "Fortran": lambda x: f"{x:.6E}".replace("E", "D"),
     "minus sign in the exponent": lambda x: f"{x:.6E}".replace("-", "−"),
     "powers of ten": lambda x: f"{x:.6E}".replace("E", "×10^").replace("-", "−"),
-    "decimal comma": lambda x: f"{x:.4f}".replace(".", ","),
 }
 
 
 @pytest.mark.parametrize("mark", [";", "\t"])
 @pytest.mark.parametrize("form", FORMS)
-def test_numbers_in_every_form_are_read(tmp_path: Path, form: str, mark: str) -> None:
-    """The digits are unambiguous, so no row is lost and nothing is asked."""
+def test_numbers_in_rare_forms_are_read(tmp_path: Path, form: str, mark: str) -> None:
+    """The random tables draw the usual ones. The digits are unambiguous, so no row is lost and nothing is asked."""
     recording = read(tmp_path, table([f"{t:.2f}" for t in T], [FORMS[form](x) for x in X], mark))
     holds(recording)
     assert not recording.malformed_rows
@@ -150,10 +142,8 @@ def test_clock_times_are_counted_from_the_first(tmp_path: Path, form: str, order
 
 
 DURATIONS = {
-    "pandas": lambda t: f"0 days 00:00:{9 + t:09.6f}",
     "Python": lambda t: f"0:00:{9 + t:09.6f}",
     "ISO": lambda t: f"PT{9 + t:.2f}S",
-    "seconds": lambda t: f"{9 + t:.2f} sec",
     "milliseconds": lambda t: f"{1000 * (9 + t):.0f} ms",
     "parts": lambda t: f"0 min {9 + t:.2f} s",
 }
@@ -229,7 +219,7 @@ def test_a_clock_that_starts_again_begins_another_run(tmp_path: Path, parts: int
     with pytest.raises(NeedsAnswer) as asked:
         read(tmp_path, text)
     (need,) = asked.value.question.needs
-    assert len(need.choices) == parts
+    assert need.choices == tuple(f"Part {number}" for number in range(1, parts + 1))
     for run in need.choices[:2]:
         recording = read(tmp_path, text, run=run)
         holds(recording)

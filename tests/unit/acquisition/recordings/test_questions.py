@@ -58,9 +58,3 @@ def test_every_choice_of_a_question_can_be_taken(tmp_path: Path, name: str) -> N
     assert len(recordings) >= choices
     assert len({each.samples.distance.tobytes() for each in recordings}) == len(recordings)
     assert len(open_recording(path, ReadOptions.of(caught.value.question.examples)).samples) == 60
-
-
-@pytest.mark.parametrize("kind", Missing)
-def test_every_question_is_answered_by_an_option(kind: Missing) -> None:
-    """A reader asks for nothing that the options of reading cannot state."""
-    assert ReadOptions.of({kind.value: "x"}).given() == {kind.value: "x"}

@@ -227,7 +227,8 @@ def test_hostile_text_is_escaped_everywhere(tmp_path: Path) -> None:
     assert "<b onload" not in page
     assert page.count("&lt;script&gt;") >= 3
     assert "&lt;b onload=x&gt;50%_&amp;" in page
-    assert r"50\%\_\&" in (written / "table.tex").read_text("utf-8")
+    in_tex = (written / "table.tex").read_text("utf-8").replace(r"\allowbreak{}", "")
+    assert r"50\%\_\&" in in_tex
 
 
 def test_a_run_without_oscillation_gives_a_report_too(folder: Path, tmp_path: Path) -> None:
