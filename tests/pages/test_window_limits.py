@@ -7,7 +7,8 @@ import os
 import random
 import struct
 import time
-from collections.abc import Iterator
+from collections.abc import Coroutine, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -115,6 +116,12 @@ def test_hostile_files_end_as_a_line(client: tuple[WindowClient, Path], tmp_path
         window.do("remove", card=card["id"])
 
 
+def apart(work: Coroutine[Any, Any, Any]) -> Any:
+    """Run a coroutine on a thread of its own: the browser of other tests has a running loop on this one."""
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(asyncio.run, work).result()
+
+
 def asked(limit_s: float) -> list[dict[str, Any]]:
     """Ask a process of the window for two minutes of a recording."""
 
@@ -125,9 +132,9 @@ def asked(limit_s: float) -> list[dict[str, Any]]:
         try:
             return [answer async for answer in child.ask({"do": "show", "card": card, "into": os.devnull}, limit_s)]
         finally:
-            child.end()
+            await child.close()
 
-    return asyncio.run(ask())
+    return apart(ask())
 
 
 def test_a_process_that_takes_too_long_or_too_much_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -160,7 +167,7 @@ def test_the_server_ends_when_its_pages_are_gone(tmp_path: Path, monkeypatch: py
             await cards.close()
         return True
 
-    assert [asyncio.run(ends(*each)) for each in ((0, False), (1, False), (0, True))] == [True, False, False]
+    assert [apart(ends(*each)) for each in ((0, False), (1, False), (0, True))] == [True, False, False]
 
 
 def test_a_window_that_was_killed_is_offered_for_a_day(tmp_path: Path) -> None:

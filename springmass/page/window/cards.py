@@ -30,6 +30,8 @@ ALIVE_S = 60.0
 """A window whose folder was not touched for so long has ended; it touches it every second."""
 LONGEST_NOTE = 4000
 TOO_MUCH = "Unpacked, this archive would exceed 1 GB or 200 files together"
+SETTLED = ("done", "question", "failed")
+"""Stages of a card that wait for a person."""
 _UNSET = dict.fromkeys(("velocity", "scene", "from_s", "to_s", "law", "accuracy"))
 BLANK: Mapping[str, Any] = {**_UNSET, "answers": {}, "bench": {}, "notes": "", "saved": False}
 """What is kept of a card besides its name and its file."""
@@ -46,7 +48,7 @@ class Card:
         self.id, self.folder = folder.name, folder
         self.kept: dict[str, Any] = {**BLANK, **kept}
         self.state: dict[str, Any] = {"stage": "waiting", "version": 0}
-        self.revision = self.wanted = 0
+        self.revision = self.wanted = self.asked = 0
         self.task: asyncio.Task[None] | None = None
 
     @property
@@ -192,12 +194,24 @@ class Cards:
         places = [place for (of, _), place in self._drops.items() if of == drop]
         for each in [key for key in self._drops if key[0] == drop]:
             del self._drops[each]
-        added = [self._add(kept).id for place in places for kept in _recordings(place)]
+        dropped = [kept for place in places for kept in _recordings(place)]
         scenes = [path for place in places for path in place.glob("*.toml") if not _is_note(path)]
+        stated, refused = None, ""
         if len(scenes) > 1:
-            raise NotTaken(f"{len(scenes)} scenes were dropped and none is used; drop one of them on its recording")
-        for card in ([on] if on in self.cards else added or [*self.cards]) if scenes else ():
-            self.change(card, {"scene": await self._scene_of(scenes[0]), "bench": {}})
+            refused = f"{len(scenes)} scenes were dropped and none is used; drop one of them on its recording"
+        elif scenes:
+            try:
+                stated = await self._scene_of(scenes[0])
+            except NotTaken as error:
+                refused = str(error)
+        of_drop = stated is not None and on not in self.cards
+        for kept in dropped:
+            self._add({**kept, "scene": stated} if of_drop else kept)
+        if stated is not None and not (of_drop and dropped):
+            for card in [on] if on in self.cards else [*self.cards]:
+                self.change(card, {"scene": stated, "bench": {}})
+        if refused:
+            raise NotTaken(refused)
 
     async def _scene_of(self, path: Path) -> dict[str, Any]:
         """Return the tables of a scene file."""
@@ -316,9 +330,8 @@ class Cards:
 
     async def _work(self, card: Card) -> None:
         """Show a card until nothing on it has changed since."""
-        done = 0
-        while done != card.wanted and card.id in self.cards:
-            done = card.wanted
+        while card.asked != card.wanted and card.id in self.cards:
+            card.asked = card.wanted
             self._say(card, stage="waiting", problem="")
             into = card.folder / "results.json"
             request = {"do": "show", "card": {**card.kept}, "into": str(into)}
@@ -377,6 +390,8 @@ class Cards:
     # What pages see.
 
     def _say(self, card: Card, **state: Any) -> None:
+        if card.asked != card.wanted and state.get("stage") in SETTLED:
+            state["stage"] = "waiting"  # for what was typed since it was asked
         card.state |= state
         self._change(card)
 

@@ -47,6 +47,11 @@ class Child:
         with contextlib.suppress(ProcessLookupError):
             self._process.kill()
 
+    async def close(self) -> None:
+        """End the process, and wait until it is gone with its pipes."""
+        self.end()
+        await self._process.communicate()
+
     async def ask(self, request: Mapping[str, Any], longest_s: float) -> AsyncGenerator[dict[str, Any]]:
         """Yield the answers to a request; ProcessEnded if the process takes too long or too much, or is ended."""
         stdin, stdout = self._process.stdin, self._process.stdout
@@ -145,5 +150,7 @@ class Children:
     async def close(self) -> None:
         """End all processes."""
         spare = [] if self._spare is None else [await self._spare]
-        for child in (*self._idle.values(), *self._busy.values(), *spare):
-            child.end()
+        for child in self._busy.values():
+            child.end()  # its request waits for it
+        for child in (*self._idle.values(), *spare):
+            await child.close()
