@@ -87,7 +87,7 @@ def test_with_the_keys_alone(window: Page) -> None:
     window.wait_for_selector("body.empty")
     reach(window, "button", "Choose files")
     choosers: list[FileChooser] = []
-    window.on("filechooser", lambda chooser: choosers.append(chooser))  # noqa: PLW0108
+    window.on("filechooser", lambda chooser: choosers.append(chooser))
     for _ in range(20):  # a browser on a busy machine may miss a key
         window.keyboard.press("Enter")
         window.wait_for_timeout(500)
