@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -35,6 +35,10 @@ MAINS_HZ, MAINS_SHARE = (50.0, 60.0, 100.0, 120.0), 0.01
 OVERTONE = 3.4
 APART = 1.0  # least distance of two lines in reciprocals of the length of the record, as those of a beat
 SIDEBANDS = 3.0  # distance in the same unit within which a decay or a change of the frequency has sidebands
+
+
+Cause = Literal["drive", "mains", "overtone"]
+"""What keeps up a line that is not the free oscillation's, or that it is an overtone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +87,11 @@ class Scaled:
     def seconds(self) -> float:
         """Length of the record, s."""
         return float(self.tau[-1])
+
+    def thinned(self, omega: float) -> Scaled:
+        """Return every so many of the samples that a line of an angular frequency, rad/s, has eight in each period."""
+        step = max(1, int(math.tau / (8.0 * omega * float(np.median(np.diff(self.tau))))))
+        return replace(self, tau=self.tau[::step], values=self.values[::step])
 
     def spectrum(self, values: F8) -> tuple[F8, F8]:
         """Return angular frequencies, rad/s, and powers of values (n,); their times need not be equally spaced."""
@@ -213,7 +222,7 @@ class Apart:
 
     frequency_hz: float
     amplitude: float  # at the start
-    cause: Literal["drive", "mains", "overtone"]
+    cause: Cause
     wave: F8  # (n,) at the times of the record
 
 
@@ -235,20 +244,30 @@ def find_apart(samples: Samples) -> Apart | None:
     omega, power = record.spectrum(record.values)
     first = float(omega[np.argmax(power)])
     for second in _others(record, first, omega, power):
-        lines = record.fitted(record.linear((first, 0.0), (second, 0.0)))
-        # What the two leave beyond the noise must be below a tenth of what they describe. Close lines must leave noise
-        # only, because a frequency that changes has sidebands.
-        if lines is None or lines.left > min(NEGLIGIBLE**2 + (samples.noise / record.scale) ** 2, NEGLIGIBLE):
+        # Most records have no such line, which a part of the samples shows in a tenth of the time.
+        if _kept_up(record.thinned(max(first, second)), samples, first, second) is None:
             continue
-        close = float(np.ptp(lines.omegas)) * record.seconds < SIDEBANDS * math.tau
-        if close and not lines.leaves_noise(samples):
-            continue
-        for number in (0, 1):
-            if (cause := _cause(lines, number)) is not None:
-                parameters = np.concatenate([[0.0], lines.values[1 + 4 * number : 5 + 4 * number]])
-                t = np.nan_to_num(samples.track.t - record.start_s)
-                size, hz = record.scale * float(lines.sizes[number]), float(lines.omegas[number]) / math.tau
-                return Apart(hz, size, cause, record.scale * DecayingModes().at(t, parameters)[0])
+        if (found := _kept_up(record, samples, first, second)) is not None:
+            lines, number, cause = found
+            parameters = np.concatenate([[0.0], lines.values[1 + 4 * number : 5 + 4 * number]])
+            t = np.nan_to_num(samples.track.t - record.start_s)
+            size, hz = record.scale * float(lines.sizes[number]), float(lines.omegas[number]) / math.tau
+            return Apart(hz, size, cause, record.scale * DecayingModes().at(t, parameters)[0])
+    return None
+
+
+def _kept_up(record: Scaled, samples: Samples, first: float, second: float) -> tuple[DecayingLines, int, Cause] | None:
+    """Return two lines that describe a record, the number of the one that is not the free oscillation's, and why."""
+    lines = record.fitted(record.linear((first, 0.0), (second, 0.0)))
+    # What the two leave beyond the noise must be below a tenth of what they describe. Close lines must leave noise
+    # only, because a frequency that changes has sidebands.
+    if lines is None or lines.left > min(NEGLIGIBLE**2 + (samples.noise / record.scale) ** 2, NEGLIGIBLE):
+        return None
+    if float(np.ptp(lines.omegas)) * record.seconds < SIDEBANDS * math.tau and not lines.leaves_noise(samples):
+        return None
+    for number in (0, 1):
+        if (cause := _cause(lines, number)) is not None:
+            return lines, number, cause
     return None
 
 
@@ -273,7 +292,7 @@ def _others(record: Scaled, first: float, omega: F8, power: F8) -> Iterator[floa
             yield line
 
 
-def _cause(lines: DecayingLines, number: int) -> Literal["drive", "mains", "overtone"] | None:
+def _cause(lines: DecayingLines, number: int) -> Cause | None:
     """Return what keeps up one of two lines, or that it is an overtone; None if it is the free oscillation."""
     other, sizes, omegas, rates = 1 - number, lines.sizes, lines.omegas, lines.rates
     mains = any(abs(float(omegas[number]) / math.tau - each) < MAINS_SHARE * each for each in MAINS_HZ)
