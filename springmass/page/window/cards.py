@@ -204,12 +204,11 @@ class Cards:
                 stated = await self._scene_of(scenes[0])
             except NotTaken as error:
                 refused = str(error)
-        of_drop = stated is not None and on not in self.cards
+        others = [on] if on in self.cards else [] if dropped else [*self.cards]
         for kept in dropped:
-            self._add({**kept, "scene": stated} if of_drop else kept)
-        if stated is not None and not (of_drop and dropped):
-            for card in [on] if on in self.cards else [*self.cards]:
-                self.change(card, {"scene": stated, "bench": {}})
+            self._add(kept if others else {**kept, "scene": stated})
+        for card in others if stated is not None else ():
+            self.change(card, {"scene": stated, "bench": {}})
         if refused:
             raise NotTaken(refused)
 
