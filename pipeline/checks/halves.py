@@ -39,8 +39,9 @@ def compare_halves(fitted: Motion) -> tuple[Motion, tuple[Notice, ...]]:
     chi2, count = sum(one.chi2 for one in every), sum(one.parameters for one in every)
     if not every or not chdtrc(count, chi2) < FALSE_ALARM:
         return fitted, ()
-    each = {name: _of_law(fit, damping, windows.t, windows.amplitude) for name, fit in damping.fits.items()}
-    fits = {name: _widened(fit, each[name]) for name, fit in damping.fits.items()}
+    fits = {
+        name: _widened(fit, _of_law(fit, damping, windows.t, windows.amplitude)) for name, fit in damping.fits.items()
+    }
     if phase.bend is None:
         omega, start = (_wider(x, turned) for x in (phase.angular_frequency, phase.phase))
         phase = replace(phase, angular_frequency=omega, phase=start)

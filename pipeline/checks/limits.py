@@ -26,6 +26,7 @@ class Limit(NamedTuple):
     least: float = -math.inf
     most: float = math.inf
     misfit: Callable[[Mapping[str, float]], Misfit] | None = None
+    of_spring: bool = True  # whether it holds only for a bob on a spring
 
 
 def _too_fast(numbers: Mapping[str, float]) -> Misfit:
@@ -39,7 +40,7 @@ def _no_distance(numbers: Mapping[str, float]) -> Misfit:
 # Below two samples per period the frequency is aliased, and below four noise decides; uneven times have no aliases.
 ENOUGH = 4.0
 LIMITS = (
-    Limit("undersampled", "samples_per_period", ("samples_per_period",), least=ENOUGH),
+    Limit("undersampled", "samples_per_period", ("samples_per_period",), least=ENOUGH, of_spring=False),
     # A bob on a spring that can only pull reaches 1, and little more if the spring goes slack.
     Limit("implausible_motion", "gravities", ("gravities", "amplitude_m", "frequency_hz"), most=1.2, misfit=_too_fast),
     # Extension of the spring by the bob at rest: 25 m correspond to a period of 10 s.
@@ -62,7 +63,7 @@ def beyond_limits(samples: Samples, fitted: Oscillation, *, spring: bool) -> Ite
     """
     numbers = _numbers(samples, fitted)
     reported = set()
-    for limit in LIMITS if spring else LIMITS[:1]:
+    for limit in (each for each in LIMITS if spring or not each.of_spring):
         if limit.code in reported or not (numbers[limit.number] < limit.least or numbers[limit.number] > limit.most):
             continue
         reported.add(limit.code)

@@ -120,8 +120,6 @@ def assembled(
         rest=rest,
         waveform=waveform,
         method=method,
-        why="",
-        refused=None,
     )
 
 

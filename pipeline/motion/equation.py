@@ -467,5 +467,4 @@ def _described(
         waveform=waveform,
         method="equation",
         why=why,
-        refused=None,
     )

@@ -124,8 +124,8 @@ class Oscillation:
     rest: RestPosition
     waveform: Waveform  # including the modes
     method: Method
-    why: str  # what a method that failed, or the equation of motion, came to
-    refused: Refusal | None  # of the equation of motion
+    why: str = ""  # what a method that failed, or the equation of motion, came to
+    refused: Refusal | None = None  # of the equation of motion
 
     @property
     def flags(self) -> U8:
