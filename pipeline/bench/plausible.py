@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from pipeline.bench.disc import added_mass_kg
-from pipeline.bench.scene import BENCH_KEYS, Scene
+from pipeline.bench.scene import BENCH_KEYS, PLACES, Scene
 from pipeline.bench.spring import GRAVITY_M_PER_S2
 from pipeline.bench.typed import readings
 from pipeline.numerics.estimate import Estimate
@@ -33,9 +33,15 @@ class Slip(NamedTuple):
     """A value that is perhaps a slip: in words, which end in both readings of its number if there are two."""
 
     attribute: str  # of the scene
-    clause: str  # without a full stop, but with a question mark
+    words: str  # from the number on, without a full stop, but with a question mark
     asks: bool
     decides: bool  # whether the readings differ so much that no result from this value can be sound
+
+    @property
+    def clause(self) -> str:
+        """The words behind the place of the value in a scene file."""
+        table, key = PLACES[self.attribute]
+        return f"[{table}] {key} = {self.words}"
 
 
 def slips(scene: Scene) -> tuple[Slip, ...]:
@@ -45,21 +51,21 @@ def slips(scene: Scene) -> tuple[Slip, ...]:
     ['[disc] diameter_m = 10.2 is larger than a bench: 10.2 m or 10.2 cm?']
     """
     found = []
-    for (table, key), quantity in BENCH_KEYS.items():
+    for quantity in BENCH_KEYS.values():
         estimate: Estimate | None = getattr(scene, quantity.attribute)
         if estimate is None:
             continue
-        name, value = f"[{table}] {key} = {estimate.value:g}", estimate.value
+        value = estimate.value
         usual, effect = _usual(scene, quantity.attribute)
         if not usual[0] <= value <= usual[1]:
             others = [each for each in readings(value, quantity.unit, usual) if each.unit != quantity.unit]
             asked = f": {value:g} {quantity.unit} or {value:g} {others[0].unit}?" if others else ""
             decides = not others or not 1.0 / DECIDING < others[0].ratio < DECIDING
             beyond = f"is beyond {usual[0]:g} to {usual[1]:g} {quantity.unit}"
-            clause = f"{name} {effect or beyond}{asked}"
-            found.append(Slip(quantity.attribute, clause, bool(asked), decides))
+            words = f"{value:g} {effect or beyond}{asked}"
+            found.append(Slip(quantity.attribute, words, bool(asked), decides))
         if quantity.least > 0.0 and estimate.u >= value:
-            wide = f"{name} has an uncertainty as large as the value, u = {estimate.u:g}"
+            wide = f"{value:g} has an uncertainty as large as the value, u = {estimate.u:g}"
             found.append(Slip(quantity.attribute, wide, asks=False, decides=True))
     return tuple(found)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from pipeline.bench.plausible import Slip, slips
+from pipeline.bench.plausible import slips
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import HEAVIEST_SHARE
 from pipeline.notice import Notice
@@ -35,11 +35,11 @@ def scene_findings(scene: Scene, effects: tuple[Effect, ...], estimates: Mapping
     }
     exact = [name for name, estimate in used.items() if estimate is not None and estimate.u == 0]
     perhaps = slips(scene)
+    said = [each.clause if each.asks else f"{each.clause}." for each in perhaps]
     # A drag coefficient that no disc has says nothing new if the diameter is in doubt already.
     if all(each.attribute != DISC for each in perhaps):
-        perhaps += tuple(_drag(estimates))
-    if perhaps:
-        said = [each.clause if each.asks else f"{each.clause}." for each in perhaps]
+        said += _drag(estimates)
+    if said:
         numbers = {"first": said[0], "more": len(said) - 1 or None, "all": " ".join(said)}
         yield Notice("scene_implausible", numbers, None if any(each.decides for each in perhaps) else "info")
     if "spring_constant" in estimates and scene.bob_mass_kg is not None and scene.spring_mass_kg is None:
@@ -48,9 +48,8 @@ def scene_findings(scene: Scene, effects: tuple[Effect, ...], estimates: Mapping
         yield Notice("uncertainty_missing", {"inputs": ", ".join(exact)})
 
 
-def _drag(estimates: Mapping[str, Estimate]) -> Iterator[Slip]:
-    """Yield a drag coefficient that no disc has."""
+def _drag(estimates: Mapping[str, Estimate]) -> Iterator[str]:
+    """Yield the question about a drag coefficient that no disc has."""
     drag, (low, high) = estimates.get("drag_coefficient"), USUAL_DRAG
     if drag is not None and not low - 2.0 * drag.u <= drag.value <= high + 2.0 * drag.u:
-        clause = f"the drag coefficient would be {drag.value:.2g}, which no disc has: is [disc] diameter_m right?"
-        yield Slip(DISC, clause, asks=True, decides=False)
+        yield f"the drag coefficient would be {drag.value:.2g}, which no disc has: is [disc] diameter_m right?"

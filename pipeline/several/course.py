@@ -20,7 +20,7 @@ from pipeline.several.compare import NEARER, Comparison, SpringRun, compare_spri
 LARGEST_BENCH = 50
 LITTLE = 0.005  # relative spread of one bench's constants up to which no run is blamed: springs are not ideal
 # Relative difference of a run from the others from which an exchange is looked for: bobs more alike than this cannot be
-# told apart on springs that differ by the quarter of a percent that one bench's own runs do.
+# distinguished on springs that differ by the quarter of a percent that one bench's own runs do.
 LEAST_EXCHANGE = 0.003
 MOST_OTHERS = FEWEST_FOR_MEDIAN + 1  # runs of a bench with which an exchanged one is compared
 EXCHANGES = ("recordings", "masses")
@@ -267,8 +267,8 @@ def _displaced(
 def _between_benches(runs: Sequence[_Displaced], found: Mapping[str, Suspect]) -> dict[str, Suspect]:
     """Return the runs of two benches that come together with the others if recordings or masses are exchanged.
 
-    Where a bench has no other run and the springs of the others scatter too much to decide, a far run is told which
-    exchange would explain it.
+    Where a bench has no other run and the springs of the others scatter too much to decide, the finding on a far run
+    names the exchange that would explain it.
     """
     sure: list[tuple[float, str, _Displaced, _Displaced]] = []
     perhaps: dict[str, Suspect] = {}

@@ -60,7 +60,7 @@ def _written(cell: Mapping[str, str]) -> str:
 
 def form_of(scene: Scene, typed: Mapping[str, Any], errors: Mapping[str, str]) -> list[dict[str, Any]]:
     """Return the fields of the form, filled with what was typed, or else with the scene."""
-    doubts = {".".join(PLACES[slip.attribute]): re.sub(r"^\[\w+\] \w+ = ", "", slip.clause) for slip in slips(scene)}
+    doubts = {".".join(PLACES[slip.attribute]): slip.words for slip in slips(scene)}
     fields: list[dict[str, Any]] = []
     for name, (label, unit, words) in FIELDS.items():
         table, _, key = name.partition(".")
