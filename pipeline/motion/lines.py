@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from pipeline.modes.mode import rotating
 from pipeline.motion.fit import Rows, fit
 from pipeline.numerics.levels import (
     FEWEST_FOR_CURVE,
@@ -19,7 +20,7 @@ from pipeline.numerics.levels import (
     OUTLIER,
     ROUNDS,
 )
-from pipeline.numerics.regression import correlation_length
+from pipeline.numerics.regression import beyond, correlation_length
 from pipeline.numerics.robust import median
 from pipeline.samples.condition import Samples
 from pipeline.track import F8, Bools
@@ -274,12 +275,16 @@ def _kept_up(record: Scaled, samples: Samples, first: float, second: float) -> t
 def _others(record: Scaled, first: float, omega: F8, power: F8) -> Iterator[float]:
     """Yield the highest line beside a steady first one, and that far above it and beside its multiples.
 
-    Neither may be one of the noise, nor a sideband of the first one's decay.
+    Neither may be one of the noise, nor a sideband of the first one's decay, which a few samples in each period give.
     """
-    wave, one = np.exp(1j * first * record.tau), np.ones_like(record.tau)
-    # Times the time too, because the first line lies between two bins.
-    columns = np.stack([one, *(x for each in (wave, record.tau * wave) for x in (each.real, each.imag))], axis=1)
-    left = record.spectrum(record.values - columns @ np.linalg.lstsq(columns, record.values, rcond=None)[0])[1]
+    part, rate = record.thinned(first), 0.0
+    single = part.fitted(part.linear((first, 0.0)))
+    if single is not None and abs(float(single.omegas[0]) - first) * record.seconds < math.tau:
+        first, rate = float(single.omegas[0]), max(float(single.rates[0]), 0.0)
+    wave = rotating(np.exp(-rate * record.tau), first * record.tau)
+    # Times the time too, because what falls is no exponential alone.
+    columns = np.stack([np.ones(wave.size), *(x for each in (wave, record.tau * wave) for x in (each.real, each.imag))])
+    left = record.spectrum(beyond(np.linalg.qr(columns.T)[0], record.values))[1]
     room = APART * math.tau / record.seconds
     beside = np.abs(omega - first * np.round(omega / first))
     far = (omega > OVERTONE * first) & (beside > room + NOTICEABLE * omega)
