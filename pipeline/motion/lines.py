@@ -94,17 +94,22 @@ class Scaled:
         step = max(1, int(math.tau / (8.0 * omega * float(np.median(np.diff(self.tau))))))
         return replace(self, tau=self.tau[::step], values=self.values[::step])
 
-    def spectrum(self, values: F8) -> tuple[F8, F8]:
-        """Return angular frequencies, rad/s, and powers of values (n,); their times need not be equally spaced."""
+    def spectrum(self, values: F8, finer: int) -> tuple[F8, F8]:
+        """Return angular frequencies, rad/s, and powers of values (n,), so many in each bin, at even times or not."""
+        from scipy.fft import next_fast_len
+
         step = float(np.median(np.diff(self.tau)))
         grid = np.arange(int(self.tau[-1] / step) + 1) * step
-        power = np.asarray(np.abs(np.fft.rfft(np.interp(grid, self.tau, values), 8 * grid.size)) ** 2, np.float64)
-        power[:8] = 0.0  # lines below one period per record count as drift
-        return 2.0 * math.pi * np.arange(power.size, dtype=np.float64) / (8 * grid.size * step), power
+        size = next_fast_len(finer * grid.size, real=True)
+        line = np.fft.rfft(np.interp(grid, self.tau, values), size)
+        power = np.asarray(line.real**2 + line.imag**2, np.float64)
+        power[: math.ceil(size / grid.size)] = 0.0  # lines below one period per record count as drift
+        return 2.0 * math.pi * np.arange(power.size, dtype=np.float64) / (size * step), power
 
     def strongest(self, values: F8) -> float:
         """Return the angular frequency of the strongest line of values (n,), rad/s."""
-        omega, power = self.spectrum(values)
+        # The next line is sought in what this one leaves, so that an eighth of a bin matters.
+        omega, power = self.spectrum(values, 8)
         return float(omega[np.argmax(power)])
 
     def linear(self, *lines: tuple[float, float]) -> F8:
@@ -242,7 +247,7 @@ def find_apart(samples: Samples) -> Apart | None:
     # Over a long gap, or at uneven times, interpolated values would have other lines.
     if float(np.max(steps)) > NEGLIGIBLE * record.seconds or float(np.std(steps)) > 0.5 * float(np.mean(steps)):
         return None
-    omega, power = record.spectrum(record.values)
+    omega, power = record.spectrum(record.values, 2)
     first = float(omega[np.argmax(power)])
     for second in _others(record, first, omega, power):
         # Most records have no such line, which a part of the samples shows in a tenth of the time.
@@ -284,7 +289,7 @@ def _others(record: Scaled, first: float, omega: F8, power: F8) -> Iterator[floa
     wave = rotating(np.exp(-rate * record.tau), first * record.tau)
     # Times the time too, because what falls is no exponential alone.
     columns = np.stack([np.ones(wave.size), *(x for each in (wave, record.tau * wave) for x in (each.real, each.imag))])
-    left = record.spectrum(beyond(np.linalg.qr(columns.T)[0], record.values))[1]
+    left = record.spectrum(beyond(np.linalg.qr(columns.T)[0], record.values), 2)[1]
     room = APART * math.tau / record.seconds
     beside = np.abs(omega - first * np.round(omega / first))
     far = (omega > OVERTONE * first) & (beside > room + NOTICEABLE * omega)
