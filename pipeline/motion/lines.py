@@ -198,28 +198,31 @@ class DecayingLines:
 
 
 def find_several(samples: Samples) -> DecayingLines | None:
-    """Fit lines together, one more at a time, until they leave no more than noise; None if they are not determined.
+    """Fit lines together, one more at a time, until they leave no more than noise; None if they always leave more.
 
     Each one starts from the highest peak of what the others leave, or half a bin beside one that has it within a bin.
+    They are sought with as many samples as the highest of them needs, and fitted to all when they are found.
     """
     record = Scaled.of(samples)
-    found = None
-    for _ in range(ROUNDS if record is not None and record.tau.size <= MOST // ROUNDS else 0):
-        assert record is not None
-        lines: list[tuple[float, float]] = []
-        if found is not None:
-            lines = list(zip(found.omegas.tolist(), found.rates.tolist(), strict=True))
-        omega, decay = record.strongest(record.values if found is None else -found.residual), 0.0
+    if record is None or record.tau.size > MOST // ROUNDS:
+        return None
+    lines: list[tuple[float, float]] = []
+    left = record.values
+    for _ in range(ROUNDS):
+        omega, decay = record.strongest(left), 0.0
         for other, rate in lines:
             if abs(omega - other) * record.seconds < math.tau:
                 omega, decay = other + math.copysign(math.pi / record.seconds, omega - other), rate
-        more = record.fitted(record.linear(*lines, (omega, decay)))
-        if more is None:
-            break
-        found = more
-        if found.leaves_noise(samples):
-            break
-    return found
+        few = record.thinned(max(omega, *(other for other, _ in lines), 0.0))
+        found = few.fitted(few.linear(*lines, (omega, decay)))
+        # Nor are lines several that stay below a tenth of the strongest, however many more there are.
+        if found is None or np.min(found.sizes) < NEGLIGIBLE * np.max(found.sizes):
+            return None
+        lines = list(zip(found.omegas.tolist(), found.rates.tolist(), strict=True))
+        left = record.less(found.values)
+        if replace(found, residual=left).leaves_noise(samples):
+            return record.fitted(found.values)
+    return None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
