@@ -90,7 +90,7 @@ class Derived:
             return {"A0": self.estimates["amplitude"], **coefficients}
         joint = scaled(fit).joint
         variables = list(correlated_values(joint.values.tolist(), joint.covariance))
-        found = _in_true_units(fit.law, joint, variables, *self.scales)
+        found = in_true_units(fit.law, joint, variables, *self.scales)
         own = {name: limited(fit.law, name, Estimate.of_variable(*x)) for name, x in found.items()}
         return {**own, **coefficients}
 
@@ -373,7 +373,7 @@ class _Laws:
         If the record shows one drag only, c A^n, and the results allow for a little of another one, c follows from
         them: :math:`\\lambda A_0 = c A_0^n`.
         """
-        found = _in_true_units(self.stated.law, self.stated.joint, self.variables, rate, scale)
+        found = in_true_units(self.stated.law, self.stated.joint, self.variables, rate, scale)
         shown = self.shown.law
         if shown is not self.stated.law and isinstance(shown, Drag):
             return {COEFFICIENTS[n]: (lam / start ** (n - 1), found[COEFFICIENTS[n]][1]) for n in shown.powers}
@@ -409,7 +409,7 @@ def _start_phase(phase: Phase, slope: Any, inputs: Inputs, dof: float) -> Any:
     return inputs.add("phase", Estimate(at_start.value, own, at_start.unit), "A", dof) + way * (slope - omega.value)
 
 
-def _in_true_units(law: Law, joint: Joint, variables: list[Any], rate: Any, scale: Any) -> dict[str, tuple[Any, str]]:
+def in_true_units(law: Law, joint: Joint, variables: list[Any], rate: Any, scale: Any) -> dict[str, tuple[Any, str]]:
     """Return the parameters of a law in true seconds and metres, with their units."""
     values = dict(zip(joint.names, variables, strict=True))
     found: dict[str, tuple[Any, str]] = {}
