@@ -99,11 +99,7 @@ def _of_all(
 def _of_drag(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
     """Return the map of the drag coefficients of all runs that have some."""
     return drag_map(
-        [
-            (disc_of(row), np.array(json.loads(points)))
-            for row in rows
-            if (points := row.get("drag_points"))
-        ]
+        [(disc_of(row), np.array(json.loads(points))) for row in rows if (points := row.get("drag_points"))]
     )
 
 
