@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from uncertainties import nominal_value
 
 from pipeline.bench.scene import Scene
 from pipeline.checks.echoes import count_quality
@@ -20,6 +21,7 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.threads import one_thread
 from pipeline.options import Options
 from pipeline.results.budget import Budget
+from pipeline.results.contour import Contour, contour
 from pipeline.results.curves import Curve, Smoothed, drag_curve, energy_curve, kinematics
 from pipeline.results.derive import Derived
 from pipeline.results.effects import Effect
@@ -117,3 +119,9 @@ class Analysis:
         if motion is None or length is None:
             return None
         return drag_curve(motion.damping, motion.windows, length, self.derived.laws)
+
+    @one_thread
+    def contour(self, shares: tuple[float, ...]) -> Contour | None:
+        """Return the regions of two parameters of the selected law that hold the truth with given probabilities."""
+        rate, scale = map(nominal_value, self.derived.scales)
+        return None if self.oscillation is None else contour(self.oscillation, (rate, scale), shares)

@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 
+from pipeline.damping.law_fit import mean_squared_rate
 from pipeline.damping.select import Damping
 from pipeline.modes.mode import Modes
 from pipeline.motion.frequency import Bend, TimeTable, turns
@@ -39,7 +40,7 @@ class Phase:
     of_pendulum: bool = False  # whether this law is that of a pendulum
     walk: Walk | None = None  # of amplitude and phase, if they wander at random; the frequency is that of the walk
     spread: Scatter | None = None  # of the windows' phases about a smooth curve; None of a single window
-    squared_rate: float | None = None  # decrease of the squared frequency by drag, 1/s^2; None: that of the windows
+    squared_rate: float | None = None  # that of the oscillation, by a fit of the equation
 
     @property
     def of_amplitude(self) -> bool:
@@ -129,6 +130,13 @@ class Oscillation:
     def start_s(self) -> float:
         """The time for which amplitude, phase and damping rate are stated, s."""
         return self.phase.t0
+
+    @property
+    def squared_rate(self) -> float:
+        """Decrease of the squared angular frequency by drag, 1/s^2."""
+        if self.phase.squared_rate is not None:
+            return self.phase.squared_rate
+        return mean_squared_rate(self.damping.best, self.damping.best.amplitude(self.windows.t - self.damping.t0))
 
     @property
     def shift(self) -> float:

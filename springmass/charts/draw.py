@@ -158,6 +158,7 @@ def draw(panel: Panel, ax: Axes) -> Axes:
     if panel.equal:
         ax.set_box_aspect(1.0)
         ax.margins(x=0.05)
+        ax.locator_params(axis="x", nbins=5)  # long numbers would meet in a square
     ax.set(xlabel=panel.x_label, ylabel=panel.label)
     return ax
 

@@ -60,7 +60,13 @@ def write_report(
     names, analyses = [run.name for run in runs], [run.analysis for run in runs]
     motions = [smoothed_or_why(analysis) for analysis in analyses]
     charts = [
-        charts_of(run.analysis, notes_of(run.recorded), run.classic, None if isinstance(each, str) else each)
+        charts_of(
+            run.analysis,
+            notes_of(run.recorded),
+            run.classic,
+            None if isinstance(each, str) else each,
+            profiles=bool(figures),
+        )
         for run, each in zip(runs, motions, strict=True)
     ]
     several: dict[str, Chart] = {}

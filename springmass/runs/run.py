@@ -223,7 +223,7 @@ class Run(Mapping[str, Estimate]):
         Parameters
         ----------
         chart : str
-            "position", "amplitude", "frequency", "spectrum", "drag", "energy", "motion" or "phase".
+            "position", "amplitude", "frequency", "spectrum", "drag", "energy", "motion", "phase" or "contour".
         ax : matplotlib.axes.Axes, optional
 
         Raises
@@ -240,10 +240,12 @@ class Run(Mapping[str, Estimate]):
         if drawn is None:
             if self.analysis.oscillation is None:
                 raise AnalysisError(f"only its position can be drawn, nothing oscillates: {self.analysis.why}")
-            needs = (
-                "[bob] mass_kg, [disc] diameter_m and an amplitude that falls" if chart == "drag" else "more periods"
-            )
-            raise AnalysisError(f"the chart {chart} needs {needs}", "state them in the scene, or record longer")
+            needs = {
+                "drag": "[bob] mass_kg, [disc] diameter_m and an amplitude that falls",
+                "contour": "a damping law of two parameters",
+            }
+            what = needs.get(chart, "more periods")
+            raise AnalysisError(f"the chart {chart} needs {what}", "state them in the scene, or record longer")
         if ax is None:
             from matplotlib import pyplot
 
