@@ -23,6 +23,7 @@ from pipeline.dynamics.equation import Equation, Problem, Real
 from pipeline.dynamics.integrator import Trajectory
 from pipeline.dynamics.strang import STRANG
 from pipeline.modes.mode import Modes
+from pipeline.motion.by_samples import FEW_WINDOWS
 from pipeline.motion.fit import Rows, allowed, clipped, fit
 from pipeline.motion.fitted import Oscillation, Phase, RestPosition, Waveform, wrapped
 from pipeline.notice import Refusal
@@ -202,7 +203,10 @@ def fit_equation(samples: Samples, windows: Windows, damping: Damping) -> Oscill
     # An average of samples has less noise between neighbours than about a sinusoid, which in turn errs where damping is
     # strongest: the quarter of the windows that it fits best shows the noise.
     every, most = rows, allowed(expected, float(np.quantile(windows.noises, 0.25)))
-    for starts in (_by_amplitude(models, windows, damping), _by_first_samples(models, rows, windows.angular_frequency)):
+    ways = [_by_amplitude(models, windows, damping)]
+    if windows.t.size < FEW_WINDOWS:
+        ways.append(_by_first_samples(models, rows, windows.angular_frequency))
+    for starts in ways:
         start = _nearest(models[-1], every, starts)
         found, rows = clipped(models[-1], every, start[models[-1].slots], least=expected, rounds=3)
         left, count = rows.left(models[-1], found.values)[rows.used], found.values.size
