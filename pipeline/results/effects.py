@@ -63,6 +63,7 @@ def tabulate(track: Track, fitted: Oscillation, scene: Scene) -> tuple[Effect, .
     return (
         *_masses(scene, counted),
         _disc_drag(scene, damping, omega.value, unit),
+        _damping(fitted),
         _bend(fitted),
         _rest_drift(fitted.rest, fitted.windows.noise),
         *_modes(fitted.modes, unit),
@@ -173,6 +174,14 @@ def _disc_drag(scene: Scene, damping: Damping, omega: float, unit: str) -> Effec
         predicted, kc = disc_rate(scene, share * damping.best.joint["A0"].value, omega)
         why = f"a thin disc at KC {kc:.3g} ({SOURCES}); measured: all damping at the start, that of the spring too"
     return Effect("disc_drag", predicted, measured, "1/s", len(damping.best.law.parameters) > 1, why)
+
+
+def _damping(fitted: Oscillation) -> Effect:
+    """Return by how much damping makes the period longer, :math:`\\omega_0/\\omega - 1`."""
+    omega = fitted.phase.angular_frequency.value
+    longer = math.sqrt(1.0 + max(fitted.squared_rate, 0.0) / omega**2) - 1.0
+    why = "makes the period longer by this share, 1/8Q^2 for linear drag; the spring constant allows for it"
+    return Effect("damping", None, longer, "1", longer > 0.0, why)
 
 
 def _bend(fitted: Oscillation) -> Effect:
