@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -14,6 +14,7 @@ from pipeline.damping.law_fit import mean_squared_rate
 from pipeline.damping.select import Damping
 from pipeline.modes.mode import Modes
 from pipeline.motion.frequency import Bend, TimeTable, turns
+from pipeline.notice import Refusal
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import Scatter
 from pipeline.track import F8, U8
@@ -98,18 +99,6 @@ class Waveform:
         return self.moving()
 
 
-RefusalCode = Literal["too_long", "misfit", "no_minimum", "driven", "no_frequency"]
-"""It takes too long to solve, leaves more than noise, has no minimum, or its best law drives the motion or stops it."""
-
-
-@dataclass(frozen=True, slots=True)
-class Refusal:
-    """Why the equation of motion was not fitted, although the damping requires it: a code and its numbers."""
-
-    code: RefusalCode
-    numbers: Mapping[str, float | str]  # as the sentences of "not_converged" call them
-
-
 Method = Literal["windows", "samples", "equation"]
 """What the motion was fitted to."""
 
@@ -125,8 +114,7 @@ class Oscillation:
     rest: RestPosition
     waveform: Waveform  # including the modes
     method: Method
-    why: str = ""  # what a method that failed, or the equation of motion, came to
-    refused: Refusal | None = None  # of the equation of motion
+    refused: tuple[Refusal, ...] = ()  # why the equation of motion, or all samples, were not fitted
 
     @property
     def flags(self) -> U8:

@@ -105,8 +105,9 @@ def simulate(
         write_readings(run_file, simulation, sensor, seed)
     elif folder is not None:
         from springmass.report.simulated import write
+        from springmass.terminal.progress import counted_figures
 
-        made = write(folder, simulation, figures)
+        made = write(folder, simulation, figures, counted_figures)
     if made is not None:
         print(f"written          {visible(str(made))}", file=say)
         of_scene = "" if scene is None else f" --scene {shlex.quote(where)}"
