@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
+from pipeline.damping.law_fit import mean_squared_rate
 from pipeline.damping.select import Damping
 from pipeline.modes.mode import Modes
 from pipeline.motion.frequency import Bend, TimeTable, turns
+from pipeline.notice import Refusal
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import Scatter
 from pipeline.track import F8, U8
@@ -38,7 +40,7 @@ class Phase:
     of_pendulum: bool = False  # whether this law is that of a pendulum
     walk: Walk | None = None  # of amplitude and phase, if they wander at random; the frequency is that of the walk
     spread: Scatter | None = None  # of the windows' phases about a smooth curve; None of a single window
-    squared_rate: float | None = None  # decrease of the squared frequency by drag, 1/s^2; None: that of the windows
+    squared_rate: float | None = None  # that of the oscillation, by a fit of the equation
 
     @property
     def of_amplitude(self) -> bool:
@@ -97,18 +99,6 @@ class Waveform:
         return self.moving()
 
 
-RefusalCode = Literal["too_long", "misfit", "no_minimum", "driven", "no_frequency"]
-"""It takes too long to solve, leaves more than noise, has no minimum, or its best law drives the motion or stops it."""
-
-
-@dataclass(frozen=True, slots=True)
-class Refusal:
-    """Why the equation of motion was not fitted, although the damping requires it: a code and its numbers."""
-
-    code: RefusalCode
-    numbers: Mapping[str, float | str]  # as the sentences of "not_converged" call them
-
-
 Method = Literal["windows", "samples", "equation"]
 """What the motion was fitted to."""
 
@@ -124,8 +114,7 @@ class Oscillation:
     rest: RestPosition
     waveform: Waveform  # including the modes
     method: Method
-    why: str = ""  # what a method that failed, or the equation of motion, came to
-    refused: Refusal | None = None  # of the equation of motion
+    refused: tuple[Refusal, ...] = ()  # why the equation of motion, or all samples, were not fitted
 
     @property
     def flags(self) -> U8:
@@ -141,6 +130,13 @@ class Oscillation:
     def start_s(self) -> float:
         """The time for which amplitude, phase and damping rate are stated, s."""
         return self.phase.t0
+
+    @property
+    def squared_rate(self) -> float:
+        """Decrease of the squared angular frequency by drag, 1/s^2."""
+        if self.phase.squared_rate is not None:
+            return self.phase.squared_rate
+        return mean_squared_rate(self.damping.best, self.damping.best.amplitude(self.windows.t - self.damping.t0))
 
     @property
     def shift(self) -> float:

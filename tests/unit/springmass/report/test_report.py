@@ -72,7 +72,7 @@ def test_figures_are_written_on_request(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setenv("MPLBACKEND", "nonsense")
     folder = reported(DATA / "undamped_simulated_position.txt", tmp_path, "--figures", "svg")
     figures = {name for name in files_in(folder) if name.startswith("figures/")}
-    assert {"figures/position.svg", "figures/amplitude.svg"} <= figures
+    assert {"figures/position.svg", "figures/amplitude.svg", "figures/contour.svg"} <= figures
     assert all(ElementTree.parse(folder / name).getroot().tag.endswith("svg") for name in figures)
     page = (folder / "report.html").read_text("utf-8")
     assert page.count("data:image/svg+xml") == len(figures)
