@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from uncertainties import nominal_value
 
 from pipeline.bench.scene import Scene
 from pipeline.checks.echoes import count_quality
@@ -20,6 +21,7 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.threads import one_thread
 from pipeline.options import Options
 from pipeline.results.budget import Budget
+from pipeline.results.contour import Contour, contour
 from pipeline.results.curves import Curve, Smoothed, drag_curve, energy_curve, kinematics
 from pipeline.results.derive import Derived
 from pipeline.results.effects import Effect
@@ -44,6 +46,7 @@ class Analysis:
     effects: tuple[Effect, ...]
     findings: tuple[Finding, ...]  # the most severe first
     derived: Derived  # estimates and their budgets
+    why: str  # why the motion is no oscillation of many cycles, in words; empty if it is one
 
     @property
     def oscillation(self) -> Oscillation | None:
@@ -99,7 +102,7 @@ class Analysis:
         True
         """
         if not isinstance(self.motion, Oscillation):
-            raise AnalysisError(f"there is no oscillation to smooth: {self.motion.why}")
+            raise AnalysisError(f"there is no oscillation to smooth: {self.why}")
         return kinematics(self.track, self.motion, self.derived.laws)
 
     def energy_curve(self) -> Curve | None:
@@ -116,3 +119,9 @@ class Analysis:
         if motion is None or length is None:
             return None
         return drag_curve(motion.damping, motion.windows, length, self.derived.laws)
+
+    @one_thread
+    def contour(self, shares: tuple[float, ...]) -> Contour | None:
+        """Return the regions of two parameters of the selected law that hold the truth with given probabilities."""
+        rate, scale = map(nominal_value, self.derived.scales)
+        return None if self.oscillation is None else contour(self.oscillation, (rate, scale), shares)

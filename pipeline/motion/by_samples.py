@@ -16,6 +16,7 @@ from pipeline.motion.averaged import Averaged, assembled
 from pipeline.motion.fit import Rows, clipped, covariance_of, fit
 from pipeline.motion.fitted import Oscillation, Phase, RestPosition, wrapped
 from pipeline.motion.frequency import amplitude_table, bends_of, turns
+from pipeline.notice import Refusal
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import Fit
 from pipeline.numerics.levels import BARE_MENTION, ROUNDS, STRONG
@@ -78,7 +79,7 @@ def fit_samples(fitted: Oscillation, samples: Samples) -> Oscillation:
         found, rows = clipped(model, rows, start, **scale, rounds=1 if few else ROUNDS)
         start = found.values
     if not found.converged:
-        return replace(fitted, why=found.tried)
+        return replace(fitted, refused=(Refusal("not_fitted", {"tried": found.tried}),))
     stated, count = samples.track.sigma_m, windows.t.size
     fits = {first: _described(model, found, rows, count, stated)}
     tail = found.values[len(model.law.parameters) :]

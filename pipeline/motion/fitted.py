@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -11,9 +11,11 @@ from typing import Literal
 import numpy as np
 from numpy.polynomial import Legendre
 
+from pipeline.damping.law_fit import mean_squared_rate
 from pipeline.damping.select import Damping
 from pipeline.modes.mode import Modes
 from pipeline.motion.frequency import Bend, TimeTable, turns
+from pipeline.notice import Refusal
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import Scatter
 from pipeline.track import F8, U8
@@ -39,7 +41,7 @@ class Phase:
     of_pendulum: bool = False  # whether this law is that of a pendulum
     walk: Walk | None = None  # of amplitude and phase, if they wander at random; the frequency is that of the walk
     spread: Scatter | None = None  # of the windows' phases about a smooth curve; None of a single window
-    squared_rate: float | None = None  # decrease of the squared frequency by drag, 1/s^2; None: that of the windows
+    squared_rate: float | None = None  # that of the oscillation, by a fit of the equation
 
     @property
     def of_amplitude(self) -> bool:
@@ -99,18 +101,6 @@ class Waveform:
         return self.moving()
 
 
-RefusalCode = Literal["too_long", "misfit", "no_minimum", "driven", "no_frequency"]
-"""It takes too long to solve, leaves more than noise, has no minimum, or its best law drives the motion or stops it."""
-
-
-@dataclass(frozen=True, slots=True)
-class Refusal:
-    """Why the equation of motion was not fitted, although the damping requires it: a code and its numbers."""
-
-    code: RefusalCode
-    numbers: Mapping[str, float | str]  # as the sentences of "not_converged" call them
-
-
 Method = Literal["windows", "samples", "equation"]
 """What the motion was fitted to."""
 
@@ -126,8 +116,7 @@ class Oscillation:
     rest: RestPosition
     waveform: Waveform  # including the modes
     method: Method
-    why: str = ""  # what a method that failed, or the equation of motion, came to
-    refused: Refusal | None = None  # of the equation of motion
+    refused: tuple[Refusal, ...] = ()  # why the equation of motion, or all samples, were not fitted
 
     @property
     def flags(self) -> U8:
@@ -143,6 +132,13 @@ class Oscillation:
     def start_s(self) -> float:
         """The time for which amplitude, phase and damping rate are stated, s."""
         return self.phase.t0
+
+    @property
+    def squared_rate(self) -> float:
+        """Decrease of the squared angular frequency by drag, 1/s^2."""
+        if self.phase.squared_rate is not None:
+            return self.phase.squared_rate
+        return mean_squared_rate(self.damping.best, self.damping.best.amplitude(self.windows.t - self.damping.t0))
 
     @property
     def shift(self) -> float:

@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from pipeline.modes.mode import rotating
 from pipeline.motion.fit import Rows, fit
 from pipeline.numerics.levels import (
     FEWEST_FOR_CURVE,
@@ -19,7 +20,7 @@ from pipeline.numerics.levels import (
     OUTLIER,
     ROUNDS,
 )
-from pipeline.numerics.regression import correlation_length
+from pipeline.numerics.regression import beyond, correlation_length
 from pipeline.numerics.robust import median
 from pipeline.samples.condition import Samples
 from pipeline.track import F8, Bools
@@ -93,17 +94,22 @@ class Scaled:
         step = max(1, int(math.tau / (8.0 * omega * float(np.median(np.diff(self.tau))))))
         return replace(self, tau=self.tau[::step], values=self.values[::step])
 
-    def spectrum(self, values: F8) -> tuple[F8, F8]:
-        """Return angular frequencies, rad/s, and powers of values (n,); their times need not be equally spaced."""
+    def spectrum(self, values: F8, finer: int) -> tuple[F8, F8]:
+        """Return angular frequencies, rad/s, and powers of values (n,), so many in each bin, at even times or not."""
+        from scipy.fft import next_fast_len
+
         step = float(np.median(np.diff(self.tau)))
         grid = np.arange(int(self.tau[-1] / step) + 1) * step
-        power = np.asarray(np.abs(np.fft.rfft(np.interp(grid, self.tau, values), 8 * grid.size)) ** 2, np.float64)
-        power[:8] = 0.0  # lines below one period per record count as drift
-        return 2.0 * math.pi * np.arange(power.size, dtype=np.float64) / (8 * grid.size * step), power
+        size = next_fast_len(finer * grid.size, real=True)
+        line = np.fft.rfft(np.interp(grid, self.tau, values), size)
+        power = np.asarray(line.real**2 + line.imag**2, np.float64)
+        power[: math.ceil(size / grid.size)] = 0.0  # lines below one period per record count as drift
+        return 2.0 * math.pi * np.arange(power.size, dtype=np.float64) / (size * step), power
 
     def strongest(self, values: F8) -> float:
         """Return the angular frequency of the strongest line of values (n,), rad/s."""
-        omega, power = self.spectrum(values)
+        # The next line is sought in what this one leaves, so that an eighth of a bin matters.
+        omega, power = self.spectrum(values, 8)
         return float(omega[np.argmax(power)])
 
     def linear(self, *lines: tuple[float, float]) -> F8:
@@ -192,28 +198,31 @@ class DecayingLines:
 
 
 def find_several(samples: Samples) -> DecayingLines | None:
-    """Fit lines together, one more at a time, until they leave no more than noise; None if they are not determined.
+    """Fit lines together, one more at a time, until they leave no more than noise; None if they always leave more.
 
     Each one starts from the highest peak of what the others leave, or half a bin beside one that has it within a bin.
+    They are sought with as many samples as the highest of them needs, and fitted to all when they are found.
     """
     record = Scaled.of(samples)
-    found = None
-    for _ in range(ROUNDS if record is not None and record.tau.size <= MOST // ROUNDS else 0):
-        assert record is not None
-        lines: list[tuple[float, float]] = []
-        if found is not None:
-            lines = list(zip(found.omegas.tolist(), found.rates.tolist(), strict=True))
-        omega, decay = record.strongest(record.values if found is None else -found.residual), 0.0
+    if record is None or record.tau.size > MOST // ROUNDS:
+        return None
+    lines: list[tuple[float, float]] = []
+    left = record.values
+    for _ in range(ROUNDS):
+        omega, decay = record.strongest(left), 0.0
         for other, rate in lines:
             if abs(omega - other) * record.seconds < math.tau:
                 omega, decay = other + math.copysign(math.pi / record.seconds, omega - other), rate
-        more = record.fitted(record.linear(*lines, (omega, decay)))
-        if more is None:
-            break
-        found = more
-        if found.leaves_noise(samples):
-            break
-    return found
+        few = record.thinned(max(omega, *(other for other, _ in lines), 0.0))
+        found = few.fitted(few.linear(*lines, (omega, decay)))
+        # Nor are lines several that stay below a tenth of the strongest, however many more there are.
+        if found is None or np.min(found.sizes) < NEGLIGIBLE * np.max(found.sizes):
+            return None
+        lines = list(zip(found.omegas.tolist(), found.rates.tolist(), strict=True))
+        left = record.less(found.values)
+        if replace(found, residual=left).leaves_noise(samples):
+            return record.fitted(found.values)
+    return None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -241,7 +250,7 @@ def find_apart(samples: Samples) -> Apart | None:
     # Over a long gap, or at uneven times, interpolated values would have other lines.
     if float(np.max(steps)) > NEGLIGIBLE * record.seconds or float(np.std(steps)) > 0.5 * float(np.mean(steps)):
         return None
-    omega, power = record.spectrum(record.values)
+    omega, power = record.spectrum(record.values, 2)
     first = float(omega[np.argmax(power)])
     for second in _others(record, first, omega, power):
         # Most records have no such line, which a part of the samples shows in a tenth of the time.
@@ -274,12 +283,16 @@ def _kept_up(record: Scaled, samples: Samples, first: float, second: float) -> t
 def _others(record: Scaled, first: float, omega: F8, power: F8) -> Iterator[float]:
     """Yield the highest line beside a steady first one, and that far above it and beside its multiples.
 
-    Neither may be one of the noise, nor a sideband of the first one's decay.
+    Neither may be one of the noise, nor a sideband of the first one's decay, which a few samples in each period give.
     """
-    wave, one = np.exp(1j * first * record.tau), np.ones_like(record.tau)
-    # Times the time too, because the first line lies between two bins.
-    columns = np.stack([one, *(x for each in (wave, record.tau * wave) for x in (each.real, each.imag))], axis=1)
-    left = record.spectrum(record.values - columns @ np.linalg.lstsq(columns, record.values, rcond=None)[0])[1]
+    part, rate = record.thinned(first), 0.0
+    single = part.fitted(part.linear((first, 0.0)))
+    if single is not None and abs(float(single.omegas[0]) - first) * record.seconds < math.tau:
+        first, rate = float(single.omegas[0]), max(float(single.rates[0]), 0.0)
+    wave = rotating(np.exp(-rate * record.tau), first * record.tau)
+    # Times the time too, because what falls is no exponential alone.
+    columns = np.stack([np.ones(wave.size), *(x for each in (wave, record.tau * wave) for x in (each.real, each.imag))])
+    left = record.spectrum(beyond(np.linalg.qr(columns.T)[0], record.values), 2)[1]
     room = APART * math.tau / record.seconds
     beside = np.abs(omega - first * np.round(omega / first))
     far = (omega > OVERTONE * first) & (beside > room + NOTICEABLE * omega)

@@ -17,7 +17,7 @@ from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.bench.spring import unstated_spring_kg
 from pipeline.checks.residual import Misfit
 from pipeline.damping.average import Weighted, average_over_laws, scaled
-from pipeline.damping.law_fit import LawFit, mean_squared_rate
+from pipeline.damping.law_fit import LawFit
 from pipeline.damping.laws import Drag, Law, free_power
 from pipeline.damping.laws.drag import COEFFICIENTS
 from pipeline.damping.local import local_decay
@@ -90,7 +90,7 @@ class Derived:
             return {"A0": self.estimates["amplitude"], **coefficients}
         joint = scaled(fit).joint
         variables = list(correlated_values(joint.values.tolist(), joint.covariance))
-        found = _in_true_units(fit.law, joint, variables, *self.scales)
+        found = in_true_units(fit.law, joint, variables, *self.scales)
         own = {name: limited(fit.law, name, Estimate.of_variable(*x)) for name, x in found.items()}
         return {**own, **coefficients}
 
@@ -232,7 +232,7 @@ def _of_motion(
     return {
         "phase_slope": slope,
         "small_swings": None if small is None else inputs.add("small_swings", small, "A", free),
-        "squared_rate": laws.squared_rate if phase.squared_rate is None else phase.squared_rate,
+        "squared_rate": fitted.squared_rate,
         "time_factor": inputs.add("clock_rate", instrument.clock_rate, "B") * (1.0 + amiss["clock"]),
         "amplitude_factor": less_certain("amplitude", laws.values[0]),
         "rate_factor": less_certain("damping_rate", laws.values[1]),
@@ -340,7 +340,6 @@ class _Laws:
         ahead = not damping.admissible and self.weighted[0].weight >= LIMIT
         self.quoted = damping.by_statement or damping.settled or ahead
         self.shown = best if self.quoted else self.stated
-        self.squared_rate = mean_squared_rate(best, best.amplitude(elapsed))
         each = np.array([values for _, values, _ in found])
         weights = np.array([one.weight for one in self.weighted])
         weights /= weights.sum()
@@ -373,7 +372,7 @@ class _Laws:
         If the record shows one drag only, c A^n, and the results allow for a little of another one, c follows from
         them: :math:`\\lambda A_0 = c A_0^n`.
         """
-        found = _in_true_units(self.stated.law, self.stated.joint, self.variables, rate, scale)
+        found = in_true_units(self.stated.law, self.stated.joint, self.variables, rate, scale)
         shown = self.shown.law
         if shown is not self.stated.law and isinstance(shown, Drag):
             return {COEFFICIENTS[n]: (lam / start ** (n - 1), found[COEFFICIENTS[n]][1]) for n in shown.powers}
@@ -409,7 +408,7 @@ def _start_phase(phase: Phase, slope: Any, inputs: Inputs, dof: float) -> Any:
     return inputs.add("phase", Estimate(at_start.value, own, at_start.unit), "A", dof) + way * (slope - omega.value)
 
 
-def _in_true_units(law: Law, joint: Joint, variables: list[Any], rate: Any, scale: Any) -> dict[str, tuple[Any, str]]:
+def in_true_units(law: Law, joint: Joint, variables: list[Any], rate: Any, scale: Any) -> dict[str, tuple[Any, str]]:
     """Return the parameters of a law in true seconds and metres, with their units."""
     values = dict(zip(joint.names, variables, strict=True))
     found: dict[str, tuple[Any, str]] = {}

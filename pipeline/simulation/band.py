@@ -8,7 +8,7 @@ percent (``pytest -m trials tests/trials/test_bands.py``).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -136,14 +136,28 @@ def _member(scene: Scene, joint: Joint, measured: Joint | None, values: list[flo
     return Problem.from_scene(member)
 
 
+def _shifted(scene: Scene, joint: Joint, measured: Joint | None) -> list[Problem]:
+    """Return the problems with each uncertain quantity shifted up by its standard uncertainty, then down."""
+    shifts = np.concatenate([sign * np.diag(np.sqrt(np.diag(joint.covariance))) for sign in (1.0, -1.0)])
+    return [_member(scene, joint, measured, values) for values in (joint.values + shifts).tolist()]
+
+
+def propagated(scene: Scene, measured: Joint | None, of: Callable[[Problem], Sequence[float]]) -> F8:
+    """Return the standard uncertainties (q,) of numbers of a motion, from those of its scene to first order."""
+    joint = uncertain(scene, measured)
+    u = np.sqrt(np.diag(joint.covariance))
+    ahead, behind = np.split(np.array([of(each) for each in _shifted(scene, joint, measured)]), 2)
+    slopes = 0.5 * (ahead - behind) / np.where(u > 0.0, u, 1.0)[:, None]
+    return np.asarray(np.sqrt(np.maximum(np.einsum("kq,kl,lq->q", slopes, joint.covariance, slopes), 0.0)))
+
+
 def spread(
     scene: Scene, seconds: float, measured: Joint | None = None, *, members: int = MEMBERS, seed: int = 0
 ) -> Band:
     """Return the band around the motion of a scene over some seconds, drawn as by :func:`draw`."""
     joint = uncertain(scene, measured)
     ensemble = draw(scene, measured, members=members, seed=seed)
-    shifts = np.concatenate([sign * np.diag(np.sqrt(np.diag(joint.covariance))) for sign in (1.0, -1.0)])
-    ensemble += [_member(scene, joint, measured, values) for values in (joint.values + shifts).tolist()]
+    ensemble += _shifted(scene, joint, measured)
     step_s = RADIANS / ensemble[0].equation.angular_frequency_per_s
     steps = max(1, math.ceil(seconds / step_s))
     if steps > MOST_STATES:

@@ -170,7 +170,7 @@ def value_label(what: str, unit: str) -> str:
     >>> value_label("amplitude", "m"), value_label("amplitude", "m/s^2")
     ('amplitude / mm', 'amplitude / (m/s²)')
     """
-    return _over(what, RECORDED_UNITS[unit].unit)
+    return quantity_over(what, RECORDED_UNITS[unit].unit)
 
 
 def rate_label(what: str, order: int, unit: str) -> str:
@@ -179,10 +179,11 @@ def rate_label(what: str, order: int, unit: str) -> str:
     >>> rate_label("velocity", 1, "m"), rate_label("rate", 1, "rad")
     ('velocity / (m/s)', 'rate / (rad/s)')
     """
-    return _over(what, Unit(1, -order).of(unit))
+    return quantity_over(what, Unit(1, -order).of(unit))
 
 
-def _over(what: str, unit: str) -> str:
+def quantity_over(what: str, unit: str) -> str:
+    """Return the label of an axis: a quantity over its unit."""
     shown = page_unit(unit)
     return f"{what} / ({shown})" if "/" in shown else f"{what} / {shown}" if shown else what
 

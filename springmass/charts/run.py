@@ -11,13 +11,25 @@ from numpy.typing import NDArray
 from pipeline.analyse import Analysis, Oscillation, Relaxation
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.levels import COVERAGE
 from pipeline.numerics.regression import scatter
 from pipeline.results.classic import CYCLES, Classic
 from pipeline.results.curves import Curve, Smoothed
 from pipeline.track import F8, UNUSABLE, Quality, Track
 from pipeline.units import RECORDED_UNITS, noun
-from springmass.charts.chart import Chart, ChartNote, Panel, Role, Series, band_of, line_of, rate_label, value_label
-from springmass.typeset import law_status, pretty
+from springmass.charts.chart import (
+    Chart,
+    ChartNote,
+    Panel,
+    Role,
+    Series,
+    band_of,
+    line_of,
+    quantity_over,
+    rate_label,
+    value_label,
+)
+from springmass.typeset import LETTERS, law_status, pretty, pretty_number
 
 REASONS: tuple[tuple[int, str], ...] = (
     (int(Quality.CLIPPED), "clipped: cut off at the end of the range"),
@@ -36,6 +48,7 @@ PER_PERIOD = 26  # points of a drawn period: a polygon that looks round
 MOST_PERIODS_DRAWN = 460  # of more periods the envelope is drawn, which a screen cannot tell from the motion
 MOST_STRETCHES, FEWEST_WINDOWS = 24, 6
 MOST_TURNS = 8  # of the phase plot; more would cover one another
+ONE_SIGMA = 0.6827  # probability of a normal deviate within one standard deviation
 PER_TURN = 120  # points of a turn of the phase plot
 MOST_SLIDING = 2000  # amplitudes of the classic method, which overlap
 
@@ -354,6 +367,27 @@ def phase(a: Analysis) -> Chart | None:
     return Chart("phase", "Phase plot", f"Velocity against displacement from rest.{some}", (panel,))
 
 
+def contour(a: Analysis) -> Chart | None:
+    """Regions of the two parameters of the selected law that are correlated most."""
+    if (found := a.contour((COVERAGE, ONE_SIGMA))) is None:
+        return None
+    x, y = (LETTERS.get(name, name) for name in found.names)
+    borders = found.ellipses if found.profiles is None else found.profiles
+    drawn: list[tuple[str, Role, F8]] = [("95 %", "data", borders[0]), ("68 %", "law", borders[1])]
+    if found.profiles is not None:
+        drawn += [(f"{p} %, by the covariance", "other", e) for p, e in zip((95, 68), found.ellipses, strict=True)]
+    lines = [line_of(label, border[:, 0], border[:, 1], role) for label, role, border in drawn]
+    series = (*lines, Series("best fit", found.centre[:1], found.centre[1:], "mark", why=("",)))
+    label, x_label = quantity_over(y, found.units[1]), quantity_over(x, found.units[0])
+    caption = (
+        f"Regions that hold {x} and {y} of the law {a.damping.selected} together with these probabilities, from the "
+        f"scatter of the recording (type A). Their correlation is {pretty_number(found.correlation, 3)}."
+    )
+    if found.profiles is not None:
+        caption += " Solid: from the profile of χ², which is no parabola here."
+    return Chart("contour", "Contour of two parameters", caption, (Panel(label, series, 4.4, x_label, equal=True),))
+
+
 def classic_method(a: Analysis, classic: Classic) -> Chart | None:
     """The lab report's choices over this analysis: two maxima, two extremes, sliding windows and their exponential."""
     if (ours := amplitude(a, [a.damping.selected])) is None:
@@ -406,6 +440,7 @@ CHARTS: Mapping[str, Callable[[Analysis], Chart | None]] = {
     "energy": energy,
     "motion": motion,
     "phase": phase,
+    "contour": contour,
 }
 """The charts of a run by name, in the report's order; the classic method needs its own analysis."""
 
@@ -415,14 +450,19 @@ def charts_of(
     notes: Sequence[ChartNote] = (),
     classic: Classic | None = None,
     smoothed: Smoothed | None = None,
+    *,
+    profiles: bool = False,
 ) -> dict[str, Chart]:
-    """Return all charts that a run allows, in the report's order; only the position if nothing oscillates."""
+    """Return all charts that a run allows, in the report's order; only the position if nothing oscillates.
+
+    ``profiles`` asks for the contour too, which may take as long as the analysis.
+    """
     makers: dict[str, Callable[[Analysis], Chart | None]] = {
         **CHARTS,
         "position": partial(position, notes=notes),
         "motion": partial(motion, smoothed=smoothed),
     }
-    charts = {name: make(a) for name, make in makers.items()}
+    charts = {name: make(a) for name, make in makers.items() if profiles or name != "contour"}
     if classic is not None:
         charts["classic"] = classic_method(a, classic)
     return {name: chart for name, chart in charts.items() if chart is not None}

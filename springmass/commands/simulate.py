@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from acquisition.errors import visible
+from pipeline.quantities import EFFECTS
 from pipeline.results.effects import Effect
 from pipeline.simulation.band import Band
 from springmass.commands.given import GivenOptions
@@ -61,11 +62,12 @@ def simulate(
     ),
     seed: Annotated[Whole, option("N", "seed of the sensor's noise (default: 0)")] = 0,
     figures: FiguresOption = (),
+    full: Annotated[bool, flag("also print effects, tolerance, cost, and what would explain the run")] = False,
     as_json: Json = False,
     reading: ReadPairs = ReadPairs(),
     given: GivenOptions,
 ) -> int:
-    """Print what the scene implies, its uncertainty and the cost; solve the equation and write the output."""
+    """Solve the equation of a scene, print its prediction beside a measured run, and write the output."""
     if scene is None and against is None:
         raise ProgramError("simulate needs --scene S.toml, or --against RUN with a scene of its own")
     if against is None:
@@ -95,8 +97,7 @@ def simulate(
         smaller = f"take --dt {error.limit} or less, " if error.limit else "take "
         remedy = f"{smaller}--method {error.other}, or --force to run it all the same"
         raise ProgramError(error.problem, remedy, where=f"{where}: ") from error
-    print(wrapped(f"band             {simulation.of_band}", " " * 17), file=sys.stderr)
-    print(_described(simulation, given=tolerance is not None), file=say)
+    print(_described(simulation, full=full, given=tolerance is not None), file=say)
     made = run_file
     if run_file is not None:
         from springmass.simulations.run_files import write_readings
@@ -104,8 +105,9 @@ def simulate(
         write_readings(run_file, simulation, sensor, seed)
     elif folder is not None:
         from springmass.report.simulated import write
+        from springmass.terminal.progress import counted_figures
 
-        made = write(folder, simulation, figures)
+        made = write(folder, simulation, figures, counted_figures)
     if made is not None:
         print(f"written          {visible(str(made))}", file=say)
         of_scene = "" if scene is None else f" --scene {shlex.quote(where)}"
@@ -115,17 +117,23 @@ def simulate(
     return OK
 
 
-def _described(simulation: Simulation, *, given: bool) -> str:
+def _described(simulation: Simulation, *, full: bool, given: bool) -> str:
     """Return the lines about a simulation; ``given`` is whether its tolerance was an option."""
-    lines = [_before(_tolerance(simulation.tolerance, simulation.band, given=given), simulation.effects)]
-    lines += [_after(simulation), *map(_grown, simulation.growths)]
-    if (over := simulation.against) is not None:
-        left = f"rms {over.rms_m * 1e3:.3g} mm, noise of a sample {over.noise_m * 1e3:.3g} mm"
-        lines += [f"against the run  {left}", *deviation_text(over)]
-        rows = [("", "predicted", "measured", "difference / u")]
-        for row in beside_measured(simulation):
-            rows.append((row.quantity.label, f"{row.value:.6g}", str(row.measured), f"{row.apart:+.1f}"))
-        lines += ["", aligned(rows)] if len(rows) > 1 else []
+    lines, over = [], simulation.against
+    rows = [("", "predicted", "measured", "difference / u")]
+    for row in beside_measured(simulation):
+        apart = "from the run" if row.apart is None else f"{row.apart:+.1f}"
+        rows.append((row.label, str(row.value), str(row.measured), apart))
+    lines += [aligned(rows), ""] if len(rows) > 1 else []
+    if over is not None:
+        left = f"rms {over.rms_m * 1e3:.3g} mm, noise of one sample {over.noise_m * 1e3:.3g} mm"
+        lines += [f"against the run  {left}", *(deviation_text(over) if full else [])]
+    lines.append(f"prediction       {_predicted(simulation)}")
+    if full:
+        tolerance = _tolerance(simulation.tolerance, simulation.band, given=given)
+        band = wrapped(f"band             {simulation.of_band}", " " * 17)
+        lines += [band, _before(tolerance, simulation.effects)]
+    lines += [_after(simulation, full=full), *map(_grown, simulation.growths)]
     return "\n".join(lines)
 
 
@@ -144,12 +152,12 @@ def _before(tolerance: str, effects: Sequence[Effect]) -> str:
     for effect in effects:
         size = "" if effect.predicted is None else f"{effect.predicted:.2g}"
         mark = "in " if effect.included else "out"
-        lines.append(wrapped(f"  {mark}  {effect.name:<30} {size:>8}  {effect.why}", " " * 48))
+        lines.append(wrapped(f"  {mark}  {EFFECTS[effect.name]:<38} {size:>8}  {effect.why}", " " * 56))
     return "\n".join([*lines, *([wrapped(tolerance, " " * 17)] if tolerance else [])])
 
 
-def _after(simulation: Simulation) -> str:
-    """Return method, step, errors and time."""
+def _after(simulation: Simulation, *, full: bool) -> str:
+    """Return method, step and errors; with ``full`` also the time."""
     solution, check, count = simulation.solution, simulation.check, simulation.count
     lines, steps = [f"method           {solution.integrator.words}"], f"{count} states"
     if solution.integrator.order:
@@ -163,8 +171,10 @@ def _after(simulation: Simulation) -> str:
         lines.append(f"predicted error  {_errors(solution.error, solution.velocity_error)}")
     if check is not None:
         lines.append(f"measured error   {_errors(check.error, check.velocity_error)}, against {check.words}")
-    took = f"{simulation.choosing_s * 1e3:.2g} ms to choose, {solution.running_s * 1e3:.2g} ms to run"
-    return "\n".join([*lines, f"price            {took}, {steps}", f"prediction       {_predicted(simulation)}"])
+    if full:
+        took = f"{simulation.choosing_s * 1e3:.2g} ms to choose, {solution.running_s * 1e3:.2g} ms to run"
+        lines.append(f"cost             {took}, {steps}")
+    return "\n".join(lines)
 
 
 def _predicted(simulation: Simulation) -> str:

@@ -22,7 +22,7 @@ from springmass.comparing.comparison import SpringComparison, comparison_words
 from springmass.report.recorded import bench_words, calibration_of, date_words, notes_of
 from springmass.report.words import method, summary
 from springmass.result.advice import SEVERITY_WORDS, notices_of
-from springmass.result.budget_tables import budgets_of
+from springmass.result.budget_tables import budgets_of, correlations_of
 from springmass.result.grades import all_sound, grades_of, leaves_more_than_noise
 from springmass.result.law_rows import laws_across, laws_of
 from springmass.result.table1 import rows_and_needs, table_rows
@@ -223,6 +223,7 @@ def _part(index: int, run: Run, charts: Mapping[str, Chart], figures: Figures, s
         "notices": notices_of(run.result["findings"], charts),
         "laws": laws_of(analysis),
         "budgets": budgets_of(analysis),
+        "correlations": correlations_of(analysis),
         "effects": analysis.effects,
         "quality": [(_cause(name, analysis.track), quality[name]) for name in ordered],
         "notes": notes_of(run.recorded)[:MOST_NOTES],

@@ -46,6 +46,15 @@ def budgets_of(analysis: Analysis) -> tuple[BudgetRow, ...]:
     return tuple(rows)
 
 
+def correlations_of(analysis: Analysis) -> list[tuple[str, list[float]]]:
+    """Return the symbol of each quantity of the budget table, and its correlations with those above it."""
+    joint = analysis.derived.joint
+    at = [joint.names.index(row.name) for row in budgets_of(analysis)]
+    return [
+        (QUANTITIES[joint.names[row]].page_symbol, joint.correlation[row, at[:i]].tolist()) for i, row in enumerate(at)
+    ]
+
+
 def budget_text(analysis: Analysis) -> str:
     """Return a brief budget in ASCII: one line per quantity with its two largest contributions.
 

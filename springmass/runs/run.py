@@ -164,7 +164,7 @@ class Run(Mapping[str, Estimate]):
     @property
     def why(self) -> str:
         """Why the run is not ``ok``, as a sentence; empty if it is."""
-        return "" if self.ok else self.analysis.motion.why
+        return "" if self.ok else self.analysis.why
 
     @property
     def law(self) -> str | None:
@@ -223,7 +223,7 @@ class Run(Mapping[str, Estimate]):
         Parameters
         ----------
         chart : str
-            "position", "amplitude", "frequency", "spectrum", "drag", "energy", "motion" or "phase".
+            "position", "amplitude", "frequency", "spectrum", "drag", "energy", "motion", "phase" or "contour".
         ax : matplotlib.axes.Axes, optional
 
         Raises
@@ -239,11 +239,13 @@ class Run(Mapping[str, Estimate]):
         drawn = CHARTS[chart](self.analysis)
         if drawn is None:
             if self.analysis.oscillation is None:
-                raise AnalysisError(f"only its position can be drawn, nothing oscillates: {self.analysis.motion.why}")
-            needs = (
-                "[bob] mass_kg, [disc] diameter_m and an amplitude that falls" if chart == "drag" else "more periods"
-            )
-            raise AnalysisError(f"the chart {chart} needs {needs}", "state them in the scene, or record longer")
+                raise AnalysisError(f"only its position can be drawn, nothing oscillates: {self.analysis.why}")
+            needs = {
+                "drag": "[bob] mass_kg, [disc] diameter_m and an amplitude that falls",
+                "contour": "a damping law of two parameters",
+            }
+            what = needs.get(chart, "more periods")
+            raise AnalysisError(f"the chart {chart} needs {what}", "state them in the scene, or record longer")
         if ax is None:
             from matplotlib import pyplot
 

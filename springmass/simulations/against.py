@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.analysis import Analysis
+from pipeline.analyse import Analysis, Oscillation
 from pipeline.numerics.estimate import Estimate
 from pipeline.simulation import Problem, Trajectory
 from pipeline.simulation.band import Band
@@ -39,11 +39,12 @@ class Against:
     """A measured run with a prediction laid over it, at the samples used (n,), in s and m.
 
     ``free`` has the times since the first sample, the displacements and the fitted velocities without false echoes.
-    ``estimates`` are the results of the run.
+    ``estimates`` are the results of the run, with the ``last_amplitude``, at the end of ``trajectory``.
     ``band`` has the quantiles (4, n) of the predicted distance relative to ``predicted``; ``inside`` is the share of
     the samples within its 95 % widened by the noise, and ``leaves_band_s`` the time from which the run leaves it.
     """
 
+    trajectory: Trajectory
     t: F8
     measured: F8
     predicted: F8
@@ -84,15 +85,26 @@ def compare_with_run(
     predicted: F8 = rest + trajectory.at(t - t[0])
     rms = float(np.sqrt(np.mean((measured - predicted) ** 2)))
     noise = analysis.estimates["noise"].value
+    last = _amplitude_at(analysis, motion, t[0] + trajectory.t[-1])
+    known = trajectory, t, measured, predicted, rms, noise, free, {**analysis.estimates, "last_amplitude": last}
     if band is None:
-        return Against(t, measured, predicted, rms, noise, free, analysis.estimates)
+        return Against(*known)
     around = band.displacement_at(t - t[0])
     left = measured - predicted
     outside = (left < around[0] - WIDER * noise) | (left > around[3] + WIDER * noise)
     shifts = _shifts(band, t - t[0], left, values)
     inside = 1.0 - float(np.mean(outside))
     leaves_band_s = _leaves(t, outside, trajectory.problem)
-    return Against(t, measured, predicted, rms, noise, free, analysis.estimates, around, inside, leaves_band_s, shifts)
+    return Against(*known, around, inside, leaves_band_s, shifts)
+
+
+def _amplitude_at(analysis: Analysis, motion: Oscillation, t: float) -> Estimate:
+    """Return the amplitude by the damping law at a time; what u of the start has besides that law scales it too."""
+    start, at = analysis.estimates["amplitude"], np.array([0.0, t - motion.damping.t0])
+    (first, last), own = motion.damping.best.amplitude(at), motion.damping.best.u_amplitude(at)
+    shared = math.sqrt(max((start.u / start.value) ** 2 - (own[0] / first) ** 2, 0.0))
+    size = start.value * float(last / first)
+    return Estimate(size, math.hypot(size * shared, start.value * float(own[1] / first)), start.unit)
 
 
 def _leaves(t: F8, outside: NDArray[np.bool_], problem: Problem) -> float | None:

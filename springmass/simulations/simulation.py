@@ -16,17 +16,17 @@ from pipeline.bench.scene import Scene
 from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError
 from pipeline.numerics.estimate import Estimate, Joint
-from pipeline.quantities import QUANTITIES, Quantity
+from pipeline.quantities import QUANTITIES
 from pipeline.results.effects import Effect, simulated_effects
 from pipeline.simulation import Integrator, Problem, Trajectory, get_integrator
-from pipeline.simulation.band import STRONGEST, Band, spread, uncertain
+from pipeline.simulation.band import STRONGEST, Band, propagated, spread, uncertain
 from pipeline.simulation.halving import Solution, auto, demand_tolerance, halved, rounding_error, solved_once
 from pipeline.simulation.methods import DOP853
 from pipeline.track import F8
 from springmass.errors import LOG, ProgramError
 from springmass.result.run_json import picked, plain
 from springmass.simulations.against import Against, compare_with_run, duration_s
-from springmass.simulations.from_run import scene_from_run
+from springmass.simulations.from_run import SCENE_KEYS, scene_from_run
 
 if TYPE_CHECKING:
     from springmass.runs.run import Run
@@ -370,52 +370,65 @@ def prediction(solved: Simulation) -> dict[str, float | None] | None:
     :math:`\\lambda = \\gamma + \\beta A + \\mu/A`, :math:`Q = \\omega_0/2\\lambda`, and the phase turns by
     :math:`\\sqrt{\\omega_0^2-\\gamma^2} + 3cA^2/8\\omega_0`. The last amplitude is that of the last state.
     """
-    eq, start = solved.problem.equation, solved.problem.amplitude_m()
-    omega, (gamma, beta, mu) = eq.angular_frequency_per_s, eq.laws()
-    if not start or not (rate := gamma + beta * start + mu / start) < STRONGEST * omega:
+    start = solved.problem.amplitude_m()
+    if not start or not _rate(solved.problem) < STRONGEST * solved.problem.equation.angular_frequency_per_s:
         return None
+    period, rate, quality = _of_problem(solved.problem)
     return {
-        "period_s": 2.0 * math.pi / (math.sqrt(omega**2 - gamma**2) + 0.375 * eq.cubic_per_m2_s2 * start**2 / omega),
+        "period_s": period,
         "damping_rate_per_s": rate,
-        "quality_factor": 0.5 * omega / rate if rate else None,
+        "quality_factor": quality if rate else None,
         "amplitude_m": start,
-        "last_amplitude_m": _last_amplitude(solved),
+        "last_amplitude_m": _last_amplitude(solved.trajectory),
     }
 
 
+def _rate(problem: Problem) -> float:
+    start, (gamma, beta, mu) = problem.amplitude_m(), problem.equation.laws()
+    return gamma + beta * start + mu / start
+
+
+def _of_problem(problem: Problem) -> tuple[float, float, float]:
+    """Return period, damping rate and quality factor at the start."""
+    eq, rate = problem.equation, _rate(problem)
+    omega, (gamma, *_) = eq.angular_frequency_per_s, eq.laws()
+    turn = math.sqrt(omega**2 - gamma**2) + 0.375 * eq.cubic_per_m2_s2 * problem.amplitude_m() ** 2 / omega
+    return 2.0 * math.pi / turn, rate, 0.5 * omega / rate if rate else math.nan
+
+
 class Predicted(NamedTuple):
-    """A result of a run beside its prediction; ``apart`` is the difference over u of the run's."""
+    """A result of a run beside its prediction, and their difference over the u of both; None if the run gave both."""
 
-    quantity: Quantity
-    value: float
+    label: str
+    value: Estimate
     measured: Estimate
-    apart: float
-
-
-_PREDICTED = {
-    "period": "period_s",
-    "damping_rate": "damping_rate_per_s",
-    "quality_factor": "quality_factor",
-    "amplitude": "amplitude_m",
-}
+    apart: float | None
 
 
 def beside_measured(solved: Simulation) -> list[Predicted]:
     """Return the results of the run that the simulation is compared with, beside their predictions."""
-    values = prediction(solved)
-    if solved.against is None or values is None:
+    ready, band, over = solved.ready, solved.band, solved.against
+    if over is None or prediction(solved) is None:
         return []
-    rows = []
-    for name, key in _PREDICTED.items():
-        value, measured = values[key], solved.against.estimates.get(name)
-        if value is not None and measured is not None and measured.u > 0.0:
-            rows.append(Predicted(QUANTITIES[name], value, measured, (measured.value - value) / measured.u))
+    values, u = [*_of_problem(solved.problem), _last_amplitude(over.trajectory)], [0.0] * 4
+    if band is not None:
+        quantiles = band.amplitude_at(over.trajectory.t[-1:])[1][:, 0]
+        u = [*propagated(ready.solved, ready.measured, _of_problem).tolist(), 0.5 * float(quantiles[2] - quantiles[1])]
+    damped = not {*SCENE_KEYS.values()}.isdisjoint(ready.from_run)
+    rows, taken = [], ("spring_constant_n_per_m" in ready.from_run, damped, damped, damped)
+    names = ("period", "damping_rate", "quality_factor", "last_amplitude")
+    for name, value, own, same in zip(names, values, u, taken, strict=True):
+        measured = over.estimates.get(name)
+        if measured is not None and measured.u > 0.0 and math.isfinite(value):
+            label = QUANTITIES[name].label if name in QUANTITIES else f"amplitude after {over.trajectory.t[-1]:.4g} s"
+            apart = None if same else (measured.value - value) / math.hypot(measured.u, own)
+            rows.append(Predicted(label, Estimate(value, own, measured.unit), measured, apart))
     return rows
 
 
-def _last_amplitude(solved: Simulation) -> float:
+def _last_amplitude(trajectory: Trajectory) -> float:
     """Return the amplitude of the last state, for which drag tilts the ellipse of states and friction shifts it."""
-    eq, y, v = solved.problem.equation, float(solved.trajectory.y[-1]), float(solved.trajectory.v[-1])
+    eq, y, v = trajectory.problem.equation, float(trajectory.y[-1]), float(trajectory.v[-1])
     omega, (gamma, beta, _) = eq.angular_frequency_per_s, eq.laws()
     y += math.copysign(eq.friction_m_per_s2, v) / omega**2 if v else 0.0
     rate = min(gamma + beta * math.hypot(y, v / omega), STRONGEST * omega)

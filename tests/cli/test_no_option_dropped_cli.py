@@ -203,6 +203,7 @@ SHOWN: dict[str, Shown] = {
         "--sensor": ("ideal", "simulate --scene bench.toml --seconds 2 -o out.h5"),
         "--seed": ("3", "simulate --scene bench.toml --seconds 2 -o out.h5"),
         "--figures": ("svg", "simulate --scene bench.toml --seconds 2"),
+        "--full": ("", "simulate --scene bench.toml --seconds 2"),
         "--json": ("", "simulate --scene bench.toml --seconds 2"),
         "--read": ("channel=x", "simulate --scene bench.toml --json --against two.csv"),
     },

@@ -21,7 +21,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 LONG = (
-    "docs/tutorial.md",
+    "docs/how-to/analyse-a-recording.md",
     "docs/tutorial-report.md",
     "docs/how-to/compare-runs.md",
     "docs/how-to/compare-with-the-classic-method.md",

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page
+from playwright.sync_api import Browser, BrowserContext, Page, expect
 
 from springmass.cli import main
 from tests.browser import chromium, headless
@@ -38,6 +38,7 @@ gamma_per_s = 0.01
 displacement_m = 0.05
 """
 KINDS = ("clipped", "undamped", "sixty_hz")
+expect.set_options(timeout=LIMIT_S * 1e3)
 LAPTOP: Any = {"width": 1366, "height": 900}
 
 

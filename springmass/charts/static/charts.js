@@ -332,7 +332,7 @@ function makeButton(words, act, name) {
   button.type = "button";
   button.textContent = words;
   if (name) button.title = button.ariaLabel = name;
-  button.addEventListener("click", () => act(button));
+  button.addEventListener("click", (event) => act(button, event));
   return button;
 }
 // Copy a text to the clipboard, even from a page that was opened from the disk.

@@ -64,7 +64,8 @@ class RecordingCard {
     for (const form of this.box.querySelectorAll("form")) form.addEventListener("submit", (event) => event.preventDefault());
     this.stop = makeButton("Stop", () => act("stop", { card: id }));
     this.again = makeButton("Try again", () => this.change({}));
-    this.at(".card-buttons").append(this.stop, this.again, makeButton("Remove", () => act("remove", { card: id })));
+    // The second click of two meets the card that moved here.
+    this.at(".card-buttons").append(this.stop, this.again, makeButton("Remove", (_, { detail }) => { if (detail < 2) act("remove", { card: id }); }));
     this.fields = new Map();
     this.make_away();
   }
@@ -76,6 +77,7 @@ class RecordingCard {
     const before = this.message || {};
     this.message = message;
     const { stage, opened, question, form } = message, waits = ["waiting", "reading", "analysing"].includes(stage);
+    for (const [name, cell] of Object.entries(this.pending)) if (JSON.stringify(message.bench[name]) === JSON.stringify(cell)) delete this.pending[name];
     this.at(".name").textContent = message.name;
     if (stage !== before.stage) this.since = performance.now();
     this.tick();
@@ -95,6 +97,13 @@ class RecordingCard {
     for (const part of [".left", ".right"]) this.at(part).hidden = !opened || stage === "question" || stage === "failed";
     if (stage === "done" && message.version !== this.shown.version) this.load(message.version);
     if (stage === "question" || stage === "failed") this.clear();
+    this.show_busy();
+  }
+
+  // Whether what is shown lacks something that was typed.
+  show_busy() {
+    const { stage, version } = this.message, drawn = stage === "done" ? this.shown.version === version : ["question", "failed"].includes(stage);
+    this.box.ariaBusy = String(!drawn || Object.keys(this.pending).length > 0);
   }
 
   tick() {
@@ -154,12 +163,10 @@ class RecordingCard {
   }
 
   answer(name, value) {
-    const answers = { ...this.message.answers, [name]: value.trim().replace(",", ".").trim() };
-    if (name !== "rate_hz") answers[name] = value;
-    if (!value) delete answers[name];
+    const answers = { [name]: name === "rate_hz" ? value.trim().replace(",", ".") : value };
     // The unit belongs to the column, and everything to the run.
-    if (name === "channel") delete answers.unit;
-    if (name === "time") delete answers.time_unit;
+    if (name === "channel") answers.unit = "";
+    if (name === "time") answers.time_unit = "";
     this.change({ answers });
   }
 
@@ -183,6 +190,7 @@ class RecordingCard {
     const name = new_id(), inputs = {}, wrong = element("p", "", { id: new_id() }), box = element("div", "", { className: "cell" });
     const typed = () => {
       this.pending[field.name] = Object.fromEntries(Object.entries(inputs).map(([part, input]) => [part, input.value]));
+      this.show_busy();
       clearTimeout(this.timer);
       this.timer = setTimeout(() => this.send_bench(), 200);
     };
@@ -201,9 +209,7 @@ class RecordingCard {
   }
 
   async send_bench() {
-    const { pending } = this;
-    await this.change({ bench: { ...this.message.bench, ...pending } });
-    if (this.pending === pending) this.pending = {};
+    if (!await this.change({ bench: this.pending })) this.pending = {};
   }
 
   // What a person takes away is made first, then loaded; a report opens in a tab of its own.
@@ -280,6 +286,7 @@ class RecordingCard {
     fold.hidden = !others.length;
     fold.ontoggle = () => { if (fold.open) this.draw_all(place, others); };
     fold.ontoggle();
+    this.show_busy();
   }
 
   draw_all(place, charts) {

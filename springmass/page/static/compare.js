@@ -19,7 +19,7 @@ function line_of(card) {
   const name = "bob.mass_kg", label = card.message.name, [mass, u] = numbers(`Mass of the bob of ${label} in g`, `u of the mass of the bob of ${label}`);
   const box = element("input", "", { type: "checkbox", checked: true, ariaLabel: `Compare ${label}` });
   box.addEventListener("change", () => { if (box.checked) Together.left_out.delete(card.id); else Together.left_out.add(card.id); show_together(); });
-  for (const input of [mass, u]) input.addEventListener("change", () => card.change({ bench: { ...card.message.bench, [name]: { text: mass.value, u: u.value, unit: "g" } } }));
+  for (const input of [mass, u]) input.addEventListener("change", () => card.change({ bench: { [name]: { text: mass.value, u: u.value, unit: "g" } } }));
   const show = () => {
     const field = card.message.form.find((each) => each.name === name);
     if (field.unit === "g") for (const [input, text] of [[mass, field.text], [u, field.u]]) if (document.activeElement !== input) input.value = text;

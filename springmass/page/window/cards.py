@@ -208,7 +208,8 @@ class Cards:
         for kept in dropped:
             self._add(kept if others else {**kept, "scene": stated})
         for card in others if stated is not None else ():
-            self.change(card, {"scene": stated, "bench": {}})
+            self.card(card).kept["bench"] = {}
+            self.change(card, {"scene": stated})
         if refused:
             raise NotTaken(refused)
 
@@ -248,9 +249,15 @@ class Cards:
         return self.cards[wanted]
 
     def change(self, wanted: str, changes: Mapping[str, Any]) -> None:
-        """Take what was typed on a card, and show what follows from it."""
+        """Take what was typed on a card, and show what follows from it.
+
+        Answers and cells of the bench replace those of their name alone: a page may not have seen the last change yet.
+        """
         card = self.card(wanted)
-        card.kept |= {name: _checked(name, value) for name, value in changes.items()} | {"saved": False}
+        taken = {name: _checked(name, value) for name, value in changes.items()}
+        for name in {"answers", "bench"} & taken.keys():
+            taken[name] = {each: text for each, text in (card.kept[name] | taken[name]).items() if text}
+        card.kept |= taken | {"saved": False}
         if set(changes) == {"notes"}:
             card.keep()
             self._change(card)
@@ -265,7 +272,7 @@ class Cards:
             answers = {**card.kept["answers"], "run": run}
             self._add({**card.kept, "name": f"{card.kept['name']}: {run}", "answers": answers})
         card.kept["name"] += f": {runs[0]}"
-        self.change(wanted, {"answers": {**card.kept["answers"], "run": runs[0]}})
+        self.change(wanted, {"answers": {"run": runs[0]}})
 
     def stop(self, wanted: str) -> None:
         """End what a card waits for."""

@@ -72,7 +72,7 @@ def test_figures_are_written_on_request(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setenv("MPLBACKEND", "nonsense")
     folder = reported(DATA / "undamped_simulated_position.txt", tmp_path, "--figures", "svg")
     figures = {name for name in files_in(folder) if name.startswith("figures/")}
-    assert {"figures/position.svg", "figures/amplitude.svg"} <= figures
+    assert {"figures/position.svg", "figures/amplitude.svg", "figures/contour.svg"} <= figures
     assert all(ElementTree.parse(folder / name).getroot().tag.endswith("svg") for name in figures)
     page = (folder / "report.html").read_text("utf-8")
     assert page.count("data:image/svg+xml") == len(figures)
@@ -158,6 +158,15 @@ def test_table_1_is_ready_for_a_spreadsheet(page: str, result: dict[str, Any]) -
     assert float(u) == pytest.approx(period["u"], rel=0.05)
     assert value.split(".")[1].isdigit()
     assert len(value.split(".")[1]) == len(u.split(".")[1])
+
+
+def test_correlations_are_shown_as_a_triangle(page: str, result: dict[str, Any]) -> None:
+    """The page has the correlations of the JSON to two decimals: of the last row, that of γ and β."""
+    rows = re.findall(r"<tr>.*?</tr>", page.partition('<table class="correlations">')[2].partition("</table>")[0], re.S)
+    shown = [[float(x.replace("−", "-")) for x in re.findall(r"<td[^>]*>([^<]*)</td>", row)] for row in rows]
+    names, matrix = result["correlations"]["names"], result["correlations"]["matrix"]
+    assert [len(row) for row in shown] == list(range(len(rows)))
+    assert shown[-1][-1] == round(matrix[names.index("beta")][names.index("gamma")], 2) < -0.5
 
 
 def grades_in(page: str) -> dict[str, str]:
