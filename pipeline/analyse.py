@@ -19,7 +19,7 @@ from pipeline.checks.echoes import echoes_by_chance, find_clusters
 from pipeline.checks.halves import compare_halves
 from pipeline.checks.judge import judge
 from pipeline.checks.residual import Misfit
-from pipeline.findings.finding import worded
+from pipeline.findings.finding import why, worded
 from pipeline.findings.motion import (
     apart_finding,
     damping_findings,
@@ -119,11 +119,11 @@ def conclude(measured: Measured, scene: Scene) -> Analysis:
     constant = "spring_constant" in derived.estimates
     left_out = part_findings(part.beginning(motion.start_s), float(track.t[0]), float(track.t[-1]))
     shown: tuple[Iterable[Notice], ...]
+    kind = tuple[Notice, ...]()
     if isinstance(motion, Oscillation):
         shown = _shown(samples, motion, derived.estimates["offset"].value, notices)
     else:
-        motion = motion if isinstance(motion, Rest) else replace(motion, why=motion.described(derived.estimates))
-        kind = kind_findings(motion, derived.estimates)
+        kind = tuple(kind_findings(motion, derived.estimates))
         shown = (kind, notices, sample_findings(samples, motion.flags, samples.noise))
     # A missing or wrong mass changes the spring constant more than anything that the recording shows.
     bench = scene_findings(scene, effects, derived.estimates) if constant or effects else ()
@@ -136,6 +136,7 @@ def conclude(measured: Measured, scene: Scene) -> Analysis:
         effects=effects,
         findings=worded(track.unit, bench, map(apart_finding, apart), left_out, *shown, clock_findings(track)),
         derived=derived,
+        why="; ".join(why(each, track.unit) for each in kind),
     )
 
 
@@ -156,4 +157,11 @@ def _shown(
     clusters, by_chance = find_clusters(track, windows, motion.phase), echoes_by_chance(samples.flags, windows)
     of_samples = sample_findings(samples, windows.flags, windows.noise, clusters, swing, by_chance=by_chance)
     several = several_findings(samples, motion, notices)
-    return several, motion_findings(motion), damping_findings(motion.damping), notices, of_samples, fit_findings(motion)
+    return (
+        several,
+        motion_findings(motion),
+        damping_findings(motion.damping),
+        notices,
+        of_samples,
+        fit_findings(motion, samples),
+    )

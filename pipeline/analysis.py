@@ -46,6 +46,7 @@ class Analysis:
     effects: tuple[Effect, ...]
     findings: tuple[Finding, ...]  # the most severe first
     derived: Derived  # estimates and their budgets
+    why: str  # why the motion is no oscillation of many cycles, in words; empty if it is one
 
     @property
     def oscillation(self) -> Oscillation | None:
@@ -101,7 +102,7 @@ class Analysis:
         True
         """
         if not isinstance(self.motion, Oscillation):
-            raise AnalysisError(f"there is no oscillation to smooth: {self.motion.why}")
+            raise AnalysisError(f"there is no oscillation to smooth: {self.why}")
         return kinematics(self.track, self.motion, self.derived.laws)
 
     def energy_curve(self) -> Curve | None:

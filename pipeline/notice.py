@@ -1,4 +1,4 @@
-"""What a stage found, before it is put into words."""
+"""What a stage found, or why it found nothing, before it is put into words."""
 
 from __future__ import annotations
 
@@ -20,3 +20,41 @@ class Notice:
     code: str
     numbers: Mapping[str, float | str | None] = field(default_factory=dict)
     severity: Severity | None = None
+
+
+RefusalCode = Literal[
+    # No cycles: at rest, at rest but for noise, no line, too few periods, too thin, not periodic, no sinusoid.
+    "still",
+    "steady",
+    "no_line",
+    "few_periods",
+    "thin",
+    "no_period",
+    "bent",
+    # The equation of motion takes too long, leaves more than noise, has no minimum, or its best law drives or stops.
+    "too_long",
+    "misfit",
+    "no_minimum",
+    "driven",
+    "no_frequency",
+    # The averaged motion: the samples have no minimum, or no period lasts.
+    "not_fitted",
+    "incoherent",
+    # No relaxation, a single exponential, no two modes.
+    "no_relaxation",
+    "exponential",
+    "no_two_modes",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """Why a kind of motion, or a way to fit it, does not describe a recording: a code and its numbers."""
+
+    code: RefusalCode
+    numbers: Mapping[str, float | str] = field(default_factory=dict)  # as the sentences in ``findings.toml`` call them
+
+    @property
+    def named(self) -> dict[str, float | str]:
+        """The numbers, and the code as a name that selects its sentences."""
+        return {self.code: "", **self.numbers}

@@ -141,6 +141,7 @@ EFFECTS: Mapping[str, str] = {
     "spring_mass": "mass of the spring",
     "added_mass": "air that the disc carries along",
     "disc_drag": "drag of the disc",
+    "damping": "damping",
     "viscous_drag": "viscous drag",
     "quadratic_drag": "quadratic drag",
     "friction": "dry friction",

@@ -84,7 +84,7 @@ def evaluate(job: tuple[Case, str, int]) -> Outcome:
     except Exception as error:  # count a defect like a refusal, so that the other records are still measured
         return Outcome(f"{type(error).__name__}: {error}", nothing, nothing)
     if (motion := analysis.oscillation) is None:
-        return Outcome(analysis.motion.why, nothing, nothing)
+        return Outcome(analysis.why, nothing, nothing)
     # Phase and amplitude refer to the first used sample, which is later if the first samples are false echoes.
     start = np.array([motion.damping.t0 - case.origin_s])
     true_phase, true_amplitude = float(truth.phase_at(start)[0]), float(truth.amplitude_at(start)[0])

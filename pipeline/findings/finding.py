@@ -31,6 +31,7 @@ class FindingKind:
     cause: str
     example: Mapping[str, float | str]
     says: tuple[str, ...] = ()
+    why: tuple[str, ...] = ()
     details: tuple[str, ...] = ()
     advice: tuple[str, ...] = ("",)
     figure: str = ""
@@ -72,7 +73,7 @@ def kinds() -> Mapping[str, FindingKind]:
 
 
 def _field(name: str, value: Any) -> Any:
-    if name in ("severity", "says", "details", "advice", "doubts", "doubts_anyway", "about", "explains"):
+    if name in ("severity", "says", "why", "details", "advice", "doubts", "doubts_anyway", "about", "explains"):
         return (value,) if isinstance(value, str) else tuple(value)
     return value
 
@@ -85,6 +86,8 @@ def word(found: Notice, unit: str = "m") -> Finding:
         raise ValueError(f"finding {found.code!r} has no severity {severity!r} in findings.toml")
     numbers = {name: each for name, each in found.numbers.items() if each is not None}
     shown = {name: _Number(name, each, unit) for name, each in numbers.items()}
+    if kind.why:
+        shown["why"] = _Number("why", why(found, unit), unit)
     return Finding(
         found.code,
         severity,
@@ -93,6 +96,12 @@ def word(found: Notice, unit: str = "m") -> Finding:
         {name: each for name, each in numbers.items() if not isinstance(each, str)},
         "" if severity == "info" else _filled(kind.advice, shown, unit)[0],
     )
+
+
+def why(found: Notice, unit: str = "m") -> str:
+    """Return what something that a stage found follows from, in words without a full stop."""
+    shown = {name: _Number(name, each, unit) for name, each in found.numbers.items() if each is not None}
+    return "; ".join(_filled(kinds()[found.code].why, shown, unit))
 
 
 def usual_advice(code: str) -> str:

@@ -29,15 +29,25 @@ from pipeline.windows.demodulate import model_error
 def kind_findings(motion: Motion, estimates: Mapping[str, Estimate]) -> Iterator[Notice]:
     """Yield what kind of motion a recording shows, if it is not an oscillation of many cycles."""
     if isinstance(motion, Relaxation) and motion.kind == "strong":
-        yield Notice("strongly_damped", {"damping_ratio": motion.damping_ratio.value, "why": motion.why})
+        ratio = motion.damping_ratio
+        yield Notice("strongly_damped", {"damping_ratio": ratio.value, "with_u": str(ratio)})
     elif isinstance(motion, Relaxation):
-        rates = {name: x.value for name, x in estimates.items() if name.startswith("relaxation_rate")}
-        yield Notice("overdamped", {**rates, "why": motion.why})
+        rates = {name: x for name, x in estimates.items() if name.startswith("relaxation_rate")}
+        with_u = {name.removeprefix("relaxation_"): str(x) for name, x in rates.items()}
+        yield Notice("overdamped", {**{name: x.value for name, x in rates.items()}, **with_u})
     elif isinstance(motion, TwoModes):
         both = {name: x.value for name, x in estimates.items() if "_mode_" in name}
-        yield Notice("two_modes", {**both, "why": motion.why})
+        (first, first_s), (second, second_s) = (_mode(estimates, name) for name in ("first", "second"))
+        beat_s = 1.0 / abs(1.0 / first_s - 1.0 / second_s)
+        yield Notice("two_modes", {**both, "first": first, "second": second, "beat_s": beat_s})
     elif isinstance(motion, Rest):
-        yield Notice("no_oscillation", {"why": motion.why})
+        yield Notice("no_oscillation", motion.why.named)
+
+
+def _mode(estimates: Mapping[str, Estimate], name: str) -> tuple[str, float]:
+    """Return the period of a mode with its u and amplitude in words, and as a number."""
+    period, size = estimates[f"{name}_mode_period"], estimates[f"{name}_mode_amplitude"]
+    return f"{period} ({amount(size.value, size.unit)})", period.value
 
 
 def apart_finding(line: Apart) -> Notice:
@@ -58,14 +68,17 @@ def several_findings(samples: Samples, motion: Oscillation, notices: tuple[Notic
         yield Notice("several_lines", {"lines": len(lines.sizes), "listed": lines.listed(samples.track.unit)})
 
 
-def fit_findings(fitted: Oscillation) -> Iterator[Notice]:
+def fit_findings(fitted: Oscillation, samples: Samples) -> Iterator[Notice]:
     """Yield what the fits of the samples came to."""
-    if fitted.method == "equation":
-        yield Notice("strongly_damped", {"why": fitted.why})
-    elif fitted.why:
-        yield Notice("not_converged", {"tried": fitted.why})
-    if fitted.refused is not None:
-        yield Notice("not_converged", {fitted.refused.code: "", **fitted.refused.numbers})
+    if fitted.phase.squared_rate is not None:
+        best, omega = fitted.damping.best, fitted.phase.angular_frequency.value
+        ratio = best.rate_at_start() / math.sqrt(omega**2 + fitted.phase.squared_rate)
+        last = float(np.max(samples.track.t[samples.used])) - fitted.start_s
+        ends = "stops" if best.amplitude(np.array([last]))[0] <= 0.0 else "goes_on"
+        law, rms = words_of(best.law), fitted.waveform.rms
+        yield Notice("strongly_damped", {ends: "", "ratio": ratio, "law": law, "rms_m": rms})
+    for refused in fitted.refused:
+        yield Notice("not_converged", refused.named)
 
 
 def motion_findings(fitted: Oscillation) -> Iterator[Notice]:
@@ -104,7 +117,7 @@ def _changing(fitted: Oscillation) -> Notice:
 def _rest_drift(rest: RestPosition, u_rate: float) -> Notice:
     numbers = {"drift_m": rest.drift}
     if rest.mean.unit == "m" and rest.mean.value > 0.0:
-        share, seconds = rest.drift / rest.mean.value, float(np.ptp(rest.t))
+        share, seconds = rest.drift / rest.mean.value, float(np.ptp(rest.curve.domain))
         if share >= u_rate * seconds:
             numbers |= {"scale_change": share, "damping_rate_error": share / seconds}
     return Notice("rest_drift", numbers)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.errors import AnalysisError
+from pipeline.notice import Refusal
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.regression import correlation_length
 from pipeline.samples.condition import COARSE, Samples, coarsest_step
@@ -24,10 +25,10 @@ class Rest:
     start_s: float
     residual: F8  # (n,)
     flags: U8  # (n,)
-    why: str  # the reason, one sentence
+    why: Refusal
 
 
-def rest_of(samples: Samples, why: str) -> Rest:
+def rest_of(samples: Samples, why: Refusal) -> Rest:
     """Return mean and noise of the samples used.
 
     The uncertainty of the mean includes the correlation of neighbours, as of a distance that steps or creeps.

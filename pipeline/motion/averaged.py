@@ -22,7 +22,7 @@ from pipeline.modes.mode import Modes
 from pipeline.motion.fitted import Method, Oscillation, Phase, RestPosition, Waveform, delay, wrapped
 from pipeline.motion.frequency import TABLE_POINTS, Phases, TimeTable, amplitude_table, find_bend, turns
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_CURVE, FEWEST_FOR_LINE, VERY_STRONG
+from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_CURVE, VERY_STRONG
 from pipeline.numerics.regression import (
     Line,
     Scatter,
@@ -32,7 +32,6 @@ from pipeline.numerics.regression import (
     smooth_curve,
 )
 from pipeline.track import F8
-from pipeline.windows.cycles import NoOscillation
 from pipeline.windows.demodulate import ROUNDING, Windows
 
 # Nodes of the quadrature of the decay rate over amplitudes, exact up to the power 15 (the same book, (1984)).
@@ -230,31 +229,22 @@ def fit_rest(windows: Windows, unit: str) -> RestPosition:
     t, offset = windows.t, windows.offset
     u = np.maximum(np.sqrt(windows.covariance[:, 2, 2]), 1e-15 * float(np.max(np.abs(offset))) + 1e-100)
     spread = scatter(t, offset, u)
-    polynomial, gain = smooth_curve(t, offset, spread)
+    curve, gain = smooth_curve(t, offset, spread)
     weight = 1.0 / spread.u[spread.kept]
     mean = float(np.average(offset[spread.kept], weights=weight**2))
     left = (offset[spread.kept] - mean) * weight
     widened = max(spread.correlation, correlation_length(left)) * max(1.0, float(left @ left) / max(left.size - 1, 1))
     estimate = Estimate(mean, math.sqrt(widened / float(weight @ weight)), unit)
-    curve = np.asarray(polynomial(t), np.float64)
-    return RestPosition(estimate, float(np.ptp(curve)), gain > VERY_STRONG, t, curve, spread)
-
-
-def check_coherence(fitted: Oscillation, typical: float) -> NoOscillation | None:
-    """Return why a motion is no oscillation, although single periods look like one; None if it is one.
-
-    Amplitude and phase of a window form a phasor. Weighted by length, half of the phasors must differ from what the fit
-    predicts by less than their own length, ``typical``, as random phasors do not.
-    """
-    if typical < 1.0 or fitted.windows.t.size < FEWEST_FOR_LINE:
-        return None
-    return NoOscillation(
-        f"no period lasts: half of the motion misses one oscillation by {typical:.0%} of its amplitude or more"
-    )
+    half_s = 0.5 * np.diff(t[[0, -1]]) / max(t.size - 1, 1)
+    ends = np.concatenate([t[:1] - half_s, t[-1:] + half_s])
+    return RestPosition(estimate, curve.convert(domain=ends), float(np.ptp(curve(t))), gain > VERY_STRONG, spread)
 
 
 def typical_miss(fitted: Oscillation) -> float:
-    """Return the median difference of windows from the fitted oscillation, over their amplitudes, weighted by these."""
+    """Return the median difference of windows from the fitted oscillation, over their amplitudes, weighted by these.
+
+    Amplitude and phase of a window form a phasor, which is compared with the one that the fit predicts.
+    """
     windows, phase = fitted.windows, fitted.phase
     expected = fitted.damping.best.amplitude(windows.t - phase.t0) * np.exp(1j * phase.total(windows.t))
     own = windows.amplitude * np.exp(1j * windows.phase)

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
+from numpy.polynomial import Legendre
 
 from pipeline.damping.law_fit import least_chi2, mean_squared_rate, weigh
 from pipeline.damping.laws.drag import COEFFICIENTS, DRAGS, Drag
@@ -23,17 +24,17 @@ from pipeline.dynamics.equation import Equation, Problem, Real
 from pipeline.dynamics.integrator import Trajectory
 from pipeline.dynamics.strang import STRANG
 from pipeline.modes.mode import Modes
+from pipeline.motion.by_samples import FEW_WINDOWS
 from pipeline.motion.fit import Rows, allowed, clipped, fit
-from pipeline.motion.fitted import Oscillation, Phase, Refusal, RestPosition, Waveform, wrapped
-from pipeline.motion.relaxation import LEAST_DAMPING
+from pipeline.motion.fitted import Oscillation, Phase, RestPosition, Waveform, wrapped
+from pipeline.notice import Refusal
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import CENTRAL_STEP, Fit, central_differences
-from pipeline.numerics.levels import FEWEST_FOR_CURVE, MISFIT, NOTICEABLE
+from pipeline.numerics.levels import FEWEST_FOR_CURVE, MISFIT
 from pipeline.numerics.regression import correlation_length
 from pipeline.parts.stopping import stop_row
 from pipeline.samples.condition import Samples
 from pipeline.track import F8
-from pipeline.units import amount
 from pipeline.windows.demodulate import Windows
 
 STATE = ("rest", "displacement", "velocity", "angular_frequency")
@@ -184,32 +185,18 @@ class Solved:
         return self.motion.position(t, theta), lambda: self.motion.derivatives(t, theta, self.slots)
 
 
-# Maximum number of periods for the fit of a weakly damped motion that stops within the record; measured: 160 periods,
-# 12,000 samples, take 1.7 s.
-LONGEST_SOLVED = 250
+def fit_equation(samples: Samples, windows: Windows, damping: Damping) -> Oscillation | Refusal:
+    """Fit the equation of motion with each of the :func:`drags`, or refuse it.
 
-
-def fit_equation(
-    samples: Samples, windows: Windows, damping: Damping, *, stopped: bool
-) -> Oscillation | Refusal | None:
-    """Fit the equation of motion if the damping requires it, or refuse it.
-
-    The result is None if damping is weak, if no law with damping can be fitted, or if linear drag or no damping is
-    selected, for which the amplitude law is exact. The parameters are the rest position, displacement and velocity at
-    the first sample, :math:`\\omega_0`, and the coefficients as defined for the amplitude laws, of :math:`\\ddot y =
-    -\\omega_0^2 y - 2\\gamma\\dot y - b|\\dot y|\\dot y - f\\,\\mathrm{sign}(\\dot y)`: :math:`\\gamma`, :math:`\\beta
-    = 4\\omega_0 b/3\\pi` and :math:`\\mu = 2f/\\pi\\omega_0`.
+    The parameters are the rest position, displacement and velocity at the first sample, :math:`\\omega_0`, and the
+    coefficients as defined for the amplitude laws, of :math:`\\ddot y = -\\omega_0^2 y - 2\\gamma\\dot y - b|\\dot
+    y|\\dot y - f\\,\\mathrm{sign}(\\dot y)`: :math:`\\gamma`, :math:`\\beta = 4\\omega_0 b/3\\pi` and :math:`\\mu =
+    2f/\\pi\\omega_0`.
 
     The law with most parameters is fitted first: its residual shows the false echoes and the noise. The other laws are
     compared with this noise and selected by the same rules as the amplitude laws.
     """
-    ratio = damping.best.rate_at_start() / windows.angular_frequency
-    laws = _fittable(damping)
-    if not laws or not _required(damping, windows, ratio, stopped=stopped):
-        return None
-    periods = windows.angular_frequency / (2.0 * math.pi) * float(np.ptp(windows.t))
-    if ratio <= NOTICEABLE and periods > LONGEST_SOLVED:
-        return Refusal("too_long", {"periods": periods, "most_periods": LONGEST_SOLVED})
+    laws, ratio = drags(damping), damping.best.rate_at_start() / windows.angular_frequency
     numbers: dict[str, float | str] = {"damping_ratio": ratio, "law": laws[-1].words}
     rows, size = _rows(samples, windows, damping), abs(float(damping.best.joint.values[0]))
     motion, expected = FreeMotion(float(np.max(rows.t)), windows.angular_frequency, size), rows.u
@@ -217,7 +204,10 @@ def fit_equation(
     # An average of samples has less noise between neighbours than about a sinusoid, which in turn errs where damping is
     # strongest: the quarter of the windows that it fits best shows the noise.
     every, most = rows, allowed(expected, float(np.quantile(windows.noises, 0.25)))
-    for starts in (_by_amplitude(models, windows, damping), _by_first_samples(models, rows, windows.angular_frequency)):
+    ways = [_by_amplitude(models, windows, damping)]
+    if windows.t.size < FEW_WINDOWS:
+        ways.append(_by_first_samples(models, rows, windows.angular_frequency))
+    for starts in ways:
         start = _nearest(models[-1], every, starts)
         found, rows = clipped(models[-1], every, start[models[-1].slots], least=expected, rounds=3)
         left, count = rows.left(models[-1], found.values)[rows.used], found.values.size
@@ -238,20 +228,10 @@ def fit_equation(
     return _described(samples, windows, damping, model, rows, fits)
 
 
-def _fittable(damping: Damping) -> list[Drag]:
-    """Return the laws to be fitted that have an equation of motion with damping, in order of parameter count."""
+def drags(damping: Damping) -> list[Drag]:
+    """Return the laws to be fitted that have an equation of motion with damping, in order of their parameters."""
     wanted = [law for law in DRAGS if law.powers and (law.name in damping.fits or law.name in damping.unfitted)]
     return sorted(wanted, key=lambda law: len(law.powers))
-
-
-def _required(damping: Damping, windows: Windows, ratio: float, *, stopped: bool) -> bool:
-    if stopped or ratio > LEAST_DAMPING:
-        return True
-    best = damping.best.law
-    if isinstance(best, Drag) and set(best.powers) <= {1}:
-        return False  # for these laws the amplitude law is exact
-    last = damping.best.amplitude(np.array([float(np.max(windows.t)) - damping.t0]))
-    return ratio > NOTICEABLE or bool(last[0] <= 0.0)
 
 
 def _rows(samples: Samples, windows: Windows, damping: Damping) -> Rows:
@@ -419,13 +399,6 @@ def _described(
     residual = samples.track.y - position
     rms = math.sqrt(float(np.mean(residual[rows.used] ** 2)))
     flags = rows.marked(samples.flags, rows.candidates, position)
-    stops = best.amplitude(np.array([np.max(rows.t)]))[0] <= 0.0
-    why = (
-        f"the damping ratio is {best.rate_at_start() / natural:.2g} at the first sample"
-        + (" and friction ends the motion within the record" if stops else "")
-        + f": the equation of motion with {model.law.words} was fitted to the samples; it leaves "
-        + amount(rms, unit)
-    )
     t, t0, u = windows.t, damping.t0, np.sqrt(np.diag(own.covariance))
     rates = {n: mean_squared_rate(x, x.amplitude(t - t0), np.ones(t.size)) for n, x in damping.considered.items()}
     if not (squared_rate := rates[damping.selected]) < natural**2:
@@ -456,7 +429,7 @@ def _described(
     noises = np.full(windows.noises.shape, rms)
     windows = replace(windows, flags=flags, residual=residual, noises=noises)
     # The rest position is the constant one of the record; the place where friction holds the bob may differ.
-    rest = RestPosition(Estimate(still, float(u[0]), unit), 0.0, False, t, np.full(t.size, still))
+    rest = RestPosition(Estimate(still, float(u[0]), unit), Legendre([still]))
     waveform = Waveform(position, partial(np.asarray, model.motion.velocity(rows.t, theta)), residual, rms)
     return Oscillation(
         windows=windows,
@@ -466,5 +439,4 @@ def _described(
         rest=rest,
         waveform=waveform,
         method="equation",
-        why=why,
     )

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from numpy.polynomial import Legendre
 
+from pipeline.damping.law_fit import mean_squared_rate
 from pipeline.damping.select import Damping
 from pipeline.modes.mode import Modes
 from pipeline.motion.frequency import Bend, TimeTable, turns
+from pipeline.notice import Refusal
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import Scatter
 from pipeline.track import F8, U8
@@ -38,7 +41,7 @@ class Phase:
     of_pendulum: bool = False  # whether this law is that of a pendulum
     walk: Walk | None = None  # of amplitude and phase, if they wander at random; the frequency is that of the walk
     spread: Scatter | None = None  # of the windows' phases about a smooth curve; None of a single window
-    squared_rate: float | None = None  # decrease of the squared frequency by drag, 1/s^2; None: that of the windows
+    squared_rate: float | None = None  # that of the oscillation, by a fit of the equation
 
     @property
     def of_amplitude(self) -> bool:
@@ -71,15 +74,16 @@ class RestPosition:
     """The rest position: its mean, and a smooth curve through the windows that counts if it ``drifts``."""
 
     mean: Estimate
-    drift: float  # peak-to-peak range of the curve
-    drifts: bool  # whether the curve fits much better than a constant
-    t: F8  # (w,) centres of the windows, s
-    curve: F8  # (w,) m
+    curve: Legendre  # m, by the time in s; its domain is the part of the record that was fitted
+    drift: float = 0.0  # peak-to-peak range of the curve at the windows
+    drifts: bool = False  # whether the curve fits much better than a constant
     spread: Scatter | None = None  # of the windows' rest positions about a smooth curve
 
     def at(self, t: F8) -> F8:
         """Return the rest position in m at times t (n,)."""
-        return np.interp(t, self.t, self.curve) if self.drifts else np.full(t.size, self.mean.value)
+        if not self.drifts:
+            return np.full(t.size, self.mean.value)
+        return np.asarray(self.curve(np.clip(t, *self.curve.domain)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,18 +101,6 @@ class Waveform:
         return self.moving()
 
 
-RefusalCode = Literal["too_long", "misfit", "no_minimum", "driven", "no_frequency"]
-"""It takes too long to solve, leaves more than noise, has no minimum, or its best law drives the motion or stops it."""
-
-
-@dataclass(frozen=True, slots=True)
-class Refusal:
-    """Why the equation of motion was not fitted, although the damping requires it: a code and its numbers."""
-
-    code: RefusalCode
-    numbers: Mapping[str, float | str]  # as the sentences of "not_converged" call them
-
-
 Method = Literal["windows", "samples", "equation"]
 """What the motion was fitted to."""
 
@@ -124,8 +116,7 @@ class Oscillation:
     rest: RestPosition
     waveform: Waveform  # including the modes
     method: Method
-    why: str = ""  # what a method that failed, or the equation of motion, came to
-    refused: Refusal | None = None  # of the equation of motion
+    refused: tuple[Refusal, ...] = ()  # why the equation of motion, or all samples, were not fitted
 
     @property
     def flags(self) -> U8:
@@ -141,6 +132,13 @@ class Oscillation:
     def start_s(self) -> float:
         """The time for which amplitude, phase and damping rate are stated, s."""
         return self.phase.t0
+
+    @property
+    def squared_rate(self) -> float:
+        """Decrease of the squared angular frequency by drag, 1/s^2."""
+        if self.phase.squared_rate is not None:
+            return self.phase.squared_rate
+        return mean_squared_rate(self.damping.best, self.damping.best.amplitude(self.windows.t - self.damping.t0))
 
     @property
     def shift(self) -> float:

@@ -11,13 +11,14 @@ two rates :math:`g \\mp \\sqrt q` for q > 0.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from pipeline.motion.fit import Rows, allowed
+from pipeline.notice import Refusal
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.least_squares import CENTRAL_STEP, Fit
@@ -25,8 +26,6 @@ from pipeline.numerics.levels import FEWEST_FOR_CURVE, NEGLIGIBLE, STRONG, VERY_
 from pipeline.numerics.regression import correlation_length, covariance_of
 from pipeline.samples.condition import Samples
 from pipeline.track import F8, U8, Quality
-from pipeline.units import noun
-from pipeline.windows.cycles import NoOscillation
 
 LARGEST_CHANGE = 20.0  # maximum change of the logarithm of a rate in the fit of a single exponential
 
@@ -203,6 +202,7 @@ BLOCK_MEANS = 300
 LEAST_DAMPING = 0.05
 
 
+NO_RELAXATION = Refusal("no_relaxation")
 # Names of the parameters; with critical damping there is no ln w.
 DECAY_PARAMETERS = ("rest", "displacement", "velocity", "log_rate", "log_stiffness")
 
@@ -218,7 +218,6 @@ class Relaxation:
     start_s: float  # time at which the fitted part of the motion begins
     residual: F8  # (n,) what the motion leaves of every sample, NaN before the start
     flags: U8  # (n,) with those before the start as outside
-    why: str = ""  # one sentence that states the rates or the damping ratio
 
     def position(self, t: F8) -> F8:
         """Return the values (n,) at times t (n,) from the start on."""
@@ -233,42 +232,29 @@ class Relaxation:
         slope = np.array([1.0, -0.5])
         return Estimate(ratio, ratio * math.sqrt(float(slope @ self.joint.covariance[3:, 3:] @ slope)))
 
-    def described(self, estimates: Mapping[str, Estimate]) -> str:
-        """Return the sentence that states the rates or the damping ratio."""
-        if self.kind == "critical":
-            return (
-                f"the motion relaxes without oscillating, at {estimates['relaxation_rate']}: "
-                "within its noise it is critically damped, with one rate"
-            )
-        if self.kind == "overdamped":
-            slow, fast = estimates["relaxation_rate_slow"], estimates["relaxation_rate_fast"]
-            return f"the motion is overdamped: it relaxes without oscillating, at {slow} and {fast}"
-        return f"the oscillation is strongly damped: its damping ratio is {self.damping_ratio}"
 
-
-def find_relaxation(samples: Samples) -> Relaxation | NoOscillation | None:
+def find_relaxation(samples: Samples) -> Relaxation | Refusal:
     """Fit the free motion of a linearly damped bob and classify its damping.
 
-    The result is :class:`NoOscillation` if the record is a single exponential, which a drift can resemble. It is None
-    if the record is no relaxation but noise, a drift, a step, a ramp or a weakly damped oscillation.
+    Refused are a single exponential, which a drift can resemble, and noise, a drift, a step, a ramp or a weakly damped
+    oscillation.
 
     A relaxation must leave no more than noise, also in its moving part alone, and end within the record (:math:`gT >
     2`). The evidence for it against a single exponential must be strong. Critical damping and the free fit are compared
-    by BIC. If a record
-    begins before the release, the fit begins where the displacement begins to fall.
+    by BIC. If a record begins before the release, the fit begins where the displacement begins to fall.
     """
     used = samples.used
     t, y = samples.track.t[used], samples.track.y[used]
     if t.size < 2 * FEWEST_FOR_CURVE:
-        return None
+        return NO_RELAXATION
     noise = max(samples.noise_of_reading, 1e-4 * float(np.ptp(y)))
     if not (noise > 0.0 and _moves(y, noise)):
-        return None
+        return NO_RELAXATION
     for first in _starts(y, noise):
         found = _follow(t[first:], y[first:], noise, samples)
-        if found is not None:
+        if found != NO_RELAXATION:
             return found
-    return None
+    return NO_RELAXATION
 
 
 def _moves(y: F8, noise: float) -> bool:
@@ -294,14 +280,14 @@ def _starts(y: F8, noise: float) -> Iterator[int]:
         yield int(held[-1])
 
 
-def _follow(t: F8, y: F8, noise: float, samples: Samples) -> Relaxation | NoOscillation | None:
+def _follow(t: F8, y: F8, noise: float, samples: Samples) -> Relaxation | Refusal:
     every = np.ones(t.size, np.bool_)
     rows, track = Rows(t - t[0], y, every, every, noise), samples.track
     found = best_decay(rows, track.rate_hz)
     if found is None or not found.rate * rows.t[-1] > 2.0 or _misses(rows, found):
-        return None
-    choice = _kind(rows, found, 0.5 * track.rate_hz, track.unit)
-    if choice is None or isinstance(choice, NoOscillation):
+        return NO_RELAXATION
+    choice = _kind(rows, found, 0.5 * track.rate_hz)
+    if isinstance(choice, Refusal):
         return choice
     kind, found = choice
     # A residual larger than the noise increases the uncertainties, and so does one whose neighbours are correlated.
@@ -321,7 +307,7 @@ def _follow(t: F8, y: F8, noise: float, samples: Samples) -> Relaxation | NoOsci
         residual=residual,
         flags=samples.flags | np.where(before, np.uint8(Quality.OUTSIDE), np.uint8(0)),
     )
-    return None if kind == "strong" and result.damping_ratio.value < LEAST_DAMPING else result
+    return NO_RELAXATION if kind == "strong" and result.damping_ratio.value < LEAST_DAMPING else result
 
 
 def _misses(rows: Rows, found: Decay) -> bool:
@@ -345,10 +331,10 @@ def _scatter(rows: Rows, found: Decay) -> float:
     return math.sqrt(float(np.median(squares)) / (size - 3))
 
 
-def _kind(rows: Rows, fit: Decay, fastest: float, unit: str) -> tuple[DampingKind, Decay] | NoOscillation | None:
+def _kind(rows: Rows, fit: Decay, fastest: float) -> tuple[DampingKind, Decay] | Refusal:
     """Return the kind of damping with the lowest BIC and its fit, unless a single exponential suffices.
 
-    None if the motion ends at a rate above ``fastest`` (in 1/s), that is between two samples, like a step.
+    None of them does if the motion ends at a rate above ``fastest`` (in 1/s), that is between two samples, like a step.
     """
     price = math.log(rows.t.size)
     rate, left = lone_exponential(rows, fit.slowest)
@@ -357,12 +343,10 @@ def _kind(rows: Rows, fit: Decay, fastest: float, unit: str) -> tuple[DampingKin
     free = fit.chi2 + 5.0 * price
     if min(critical, free) > left + 3.0 * price - STRONG:
         if rate > fastest:
-            return None
-        return NoOscillation(
-            f"the {noun(unit)} follows one exponential, at {rate:.3g} 1/s: a drift or an overdamped motion"
-        )
+            return NO_RELAXATION
+        return Refusal("exponential", {"rate": rate})
     if one is not None and critical <= free:
-        return ("critical", one) if one.rate <= fastest else None
+        return ("critical", one) if one.rate <= fastest else NO_RELAXATION
     if fit.slowest > fastest:
-        return None
+        return NO_RELAXATION
     return ("overdamped" if fit.square > 0.0 else "strong"), fit

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from pipeline.motion.lines import WEAKER, Scaled
+from pipeline.notice import Refusal
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.levels import NEGLIGIBLE
 from pipeline.samples.condition import Samples
 from pipeline.track import F8, U8
-from pipeline.units import amount
 
 # Minimum numbers of beats and of periods of the slower mode in the record; with fewer, two modes cannot be
 # distinguished from one that changes.
@@ -32,18 +31,6 @@ class TwoModes:
     start_s: float
     residual: F8  # (n,)
     flags: U8  # (n,)
-    why: str = ""  # one sentence that states the periods and amplitudes of both modes
-
-    def described(self, estimates: Mapping[str, Estimate]) -> str:
-        """Return the sentence that states the periods and amplitudes of both modes."""
-        periods = [estimates[f"{name}_mode_period"] for name in ("first", "second")]
-        sizes = [estimates[f"{name}_mode_amplitude"] for name in ("first", "second")]
-        first, second = (f"{t} ({amount(a.value, a.unit)})" for t, a in zip(periods, sizes, strict=True))
-        beat_s = 1.0 / abs(1.0 / periods[0].value - 1.0 / periods[1].value)
-        return (
-            f"two modes of like strength oscillate together, at periods of {first} and {second}: "
-            f"they beat every {beat_s:.3g} s"
-        )
 
 
 MODE_PARAMETERS = (
@@ -52,29 +39,29 @@ MODE_PARAMETERS = (
 )
 
 
-def find_two_modes(samples: Samples) -> TwoModes | None:
-    """Return the two modes that a record consists of; None if two modes do not describe it.
+def find_two_modes(samples: Samples) -> TwoModes | Refusal:
+    """Return the two modes that a record consists of, or refuse them if they do not describe it.
 
     :math:`o + \\sum_i e^{-g_i t}(a_i\\cos\\omega_i t + b_i\\sin\\omega_i t)` is fitted to all samples used, started
     from the strongest line of the spectrum and the strongest line of the residual of the first. Covariances are scaled
     by the residuals, including their correlation.
     """
     if (record := Scaled.of(samples)) is None:
-        return None
+        return Refusal("no_two_modes")
     first = record.strongest(record.values)
     second = record.strongest(record.less(record.linear((first, 0.0))))
     lines = record.fitted(record.linear((first, 0.0), (second, 0.0)))
     if lines is None or not lines.left < NEGLIGIBLE:
-        return None
+        return Refusal("no_two_modes")
     strong, weak = np.argsort(-lines.sizes).tolist()
     omegas, sizes = lines.omegas, lines.sizes
     beats = abs(omegas[0] - omegas[1]) * record.seconds / (2.0 * math.pi)
     slow, fast = float(np.min(omegas)), float(np.max(omegas))
     if slow * record.seconds < 2.0 * math.pi * PERIODS or beats < BEATS or sizes[weak] < WEAKER * sizes[strong]:
-        return None
+        return Refusal("no_two_modes")
     # A component at a multiple of the slower frequency is not a second mode but a harmonic, as of a square wave.
     if round(fast / slow) > 1 and abs(fast - round(fast / slow) * slow) * record.seconds < math.pi:
-        return None
+        return Refusal("no_two_modes")
     order = [0, *(k for i in (strong, weak) for k in range(1 + 4 * i, 5 + 4 * i))]
     # Back to the unit of the record; the rest position was measured from the mean.
     scale, unit = record.scale, samples.track.unit

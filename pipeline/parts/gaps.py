@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import AnalysisError
+from pipeline.notice import Refusal
 from pipeline.numerics.levels import FEWEST_FOR_CURVE, FEWEST_FOR_MEDIAN, NEGLIGIBLE, SIGNIFICANT
 from pipeline.numerics.regression import correlation_length, solve_weighted
 from pipeline.parts.spans import Partition, Span, SpanKind
 from pipeline.samples.condition import GAP, Samples
 from pipeline.track import F8, Quality
-from pipeline.windows.cycles import Cycles, NoOscillation, find_cycles
+from pipeline.windows.cycles import Cycles, find_cycles
 from pipeline.windows.demodulate import ROUNDING, demodulate
 
 
@@ -45,7 +46,7 @@ def longest_part(samples: Samples) -> Partition | None:
 def _oscillation(samples: Samples, rows: NDArray[np.bool_]) -> tuple[Samples, Cycles] | None:
     """Return the record with all but some samples flagged, and its cycles; None if they show no oscillation."""
     part = replace(samples, flags=samples.flags | np.where(rows, np.uint8(0), np.uint8(Quality.OUTSIDE)))
-    if np.count_nonzero(part.used) < FEWEST_FOR_CURVE or isinstance(cycles := find_cycles(part), NoOscillation):
+    if np.count_nonzero(part.used) < FEWEST_FOR_CURVE or isinstance(cycles := find_cycles(part), Refusal):
         return None
     return part, cycles
 

@@ -8,12 +8,13 @@ from itertools import count, takewhile
 
 import numpy as np
 
+from pipeline.notice import Refusal
 from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_CURVE, FEWEST_FOR_MEDIAN, IMPROBABLE, NEGLIGIBLE, ROUNDS
 from pipeline.numerics.regression import chi2_quantile
 from pipeline.numerics.robust import median
 from pipeline.samples.condition import Samples
 from pipeline.track import F8
-from pipeline.windows.cycles import NoOscillation, find_cycles
+from pipeline.windows.cycles import find_cycles
 from pipeline.windows.demodulate import Windows, demodulate
 
 # Maximum deviation of times that are row numbers from equal steps, in steps: that of times printed to 10 us at 100 Hz.
@@ -58,7 +59,7 @@ def find_lost_rows(samples: Samples, windows: Windows) -> LostRows | None:
             if (lost := _lost(y, turn, length)) is None:
                 break
             trial = replace(samples, track=replace(track, t=track.t + step_s * np.cumsum(lost)))
-            if isinstance(cycles := find_cycles(trial), NoOscillation):
+            if isinstance(cycles := find_cycles(trial), Refusal):
                 break
             windows = demodulate(trial, cycles)
             turn = windows.angular_frequency * step_s

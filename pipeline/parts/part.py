@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.notice import Refusal
 from pipeline.numerics.levels import FEWEST_FOR_CURVE, NEGLIGIBLE, ROUNDS
 from pipeline.parts.clipping import find_clipping
 from pipeline.parts.gaps import longest_part
@@ -15,8 +16,7 @@ from pipeline.parts.spans import Partition, Span, SpanKind, before_trigger, free
 from pipeline.parts.stopping import moving_part
 from pipeline.samples.condition import Samples, condition
 from pipeline.track import Quality
-from pipeline.units import amount, noun
-from pipeline.windows.cycles import Cycles, NoOscillation, find_cycles
+from pipeline.windows.cycles import Cycles, find_cycles
 from pipeline.windows.demodulate import Windows, demodulate, follow
 from pipeline.windows.walk import Walk, walk_of
 
@@ -41,7 +41,7 @@ class Part:
 
     samples: Samples
     partition: Partition | None
-    windows: Windows | NoOscillation
+    windows: Windows | Refusal
     stopped: bool = False
     lost: LostRows | None = None
     walk: Walk | None = None  # of amplitude and phase, if they wander at random
@@ -60,7 +60,7 @@ def find_part(samples: Samples) -> Part:
     return part if isinstance(part, Part) else Part(samples, None, part)
 
 
-def _free_part(samples: Samples) -> Part | NoOscillation:
+def _free_part(samples: Samples) -> Part | Refusal:
     """Return the part that oscillates freely, or why no cycles are found.
 
     The time before the trigger, the time long after the stop and all but one free part are left out. The samples are
@@ -71,7 +71,7 @@ def _free_part(samples: Samples) -> Part | NoOscillation:
         if (outside := find(samples)) is not None:
             samples, partition = condition(outside.flagged(samples.track)), outside.within(partition)
     cycles, stopped = _cycles(samples)
-    if isinstance(cycles, NoOscillation):
+    if isinstance(cycles, Refusal):
         # A long time in the hand hides the motion after it, which the later half may show.
         t = samples.track.t[samples.used]
         if t.size < 2 * FEWEST_FOR_CURVE:
@@ -80,7 +80,7 @@ def _free_part(samples: Samples) -> Part | NoOscillation:
         later = Partition(half_s, math.inf, (Span(SpanKind.HANDLED, float(t[0]), half_s),))
         trial = condition(later.flagged(samples.track))
         trimmed, stopped = _cycles(trial, 1.0 - EARLY)
-        if isinstance(trimmed, NoOscillation):
+        if isinstance(trimmed, Refusal):
             return cycles
         windows = demodulate(trial, trimmed)
         unclear = windows.noise > NEGLIGIBLE * float(np.max(windows.amplitude))
@@ -92,7 +92,7 @@ def _free_part(samples: Samples) -> Part | NoOscillation:
     if (lost := find_lost_rows(samples, windows)) is not None:
         samples = lost.samples
         cycles, stopped = _cycles(samples)
-        if isinstance(cycles, NoOscillation):
+        if isinstance(cycles, Refusal):
             return cycles
         windows = demodulate(samples, cycles)
     if (walk := walk_of(windows)) is not None:
@@ -109,7 +109,7 @@ def _free_part(samples: Samples) -> Part | NoOscillation:
                 break
         shorter = condition(outside.flagged(samples.track))
         trimmed, stops = _cycles(shorter)
-        if isinstance(trimmed, NoOscillation):
+        if isinstance(trimmed, Refusal):
             break
         samples, partition, stopped = shorter, outside.within(partition), stops
         windows = demodulate(samples, trimmed)
@@ -134,25 +134,25 @@ def _long_after_stop(samples: Samples) -> Partition | None:
     return Partition(-math.inf, last_s, (Span(SpanKind.AT_REST, last_s, float(t[-1])),))
 
 
-def _cycles(samples: Samples, early: float = EARLY) -> tuple[Cycles | NoOscillation, bool]:
+def _cycles(samples: Samples, early: float = EARLY) -> tuple[Cycles | Refusal, bool]:
     """Return the cycles and whether the bob stops before a share of the samples; if so, those of the moving part."""
     cycles = find_cycles(samples)
-    moving = moving_part(samples, 1.0 - EARLY if isinstance(cycles, NoOscillation) else early)
-    if moving is None or isinstance(trimmed := find_cycles(moving), NoOscillation):
+    moving = moving_part(samples, 1.0 - EARLY if isinstance(cycles, Refusal) else early)
+    if moving is None or isinstance(trimmed := find_cycles(moving), Refusal):
         return cycles, False
     return trimmed, True
 
 
-def check_sinusoid(samples: Samples, windows: Windows) -> NoOscillation | None:
+def check_sinusoid(samples: Samples, windows: Windows) -> Refusal | None:
     """Return why the motion is no oscillation, although its spectrum has a peak; None if it is one.
 
     A step or a ramp has a peak in its spectrum too.
     """
     most = windows.amplitude.size * 9 // 10
     size = float(np.partition(windows.amplitude, most)[most])
-    left, unit = windows.noise, samples.track.unit
+    left = windows.noise
     if not size > 1e-12 * float(np.max(np.abs(windows.offset))):
-        return NoOscillation(f"the {noun(unit)} does not follow the period of its spectrum")
+        return Refusal("no_period")
     # Correlated noise, a drift or a random walk makes neighbouring samples more similar than white noise does.
     noise = samples.noise_of_reading
     # Both noises are estimated from the same n samples. For white noise the ratio of their squares has a variance of
@@ -162,10 +162,7 @@ def check_sinusoid(samples: Samples, windows: Windows) -> NoOscillation | None:
     if left <= 0.15 * size or (left <= 4.0 * samples.noise and excess <= MOST_BENT * size):
         return None
     if left > MOST_BENT * size or windows.t.size < FEWEST_FOR_CURVE:
-        return NoOscillation(
-            f"the {noun(unit)} changes, but a sinusoid of {amount(size, unit, '.3g')} leaves "
-            f"{amount(left, unit, '.3g')}"
-        )
+        return Refusal("bent", {"size_m": size, "left_m": left})
     return None
 
 

@@ -24,6 +24,7 @@ from pipeline.results.derive import in_true_units
 from pipeline.track import F8
 
 DIRECTIONS = 48  # in which a border is searched; between them it is a straight line
+PROBED = 4  # every fourth direction shows whether chi-square is a parabola
 SEARCHED = 1e-3  # standard uncertainties by which a border is uncertain
 UNBOUNDED = 50.0  # standard uncertainties beyond which no border is searched: chi-square does not bound the parameter
 
@@ -47,11 +48,11 @@ def contour(motion: Oscillation, scales: tuple[float, float], shares: tuple[floa
     given if a border lies elsewhere than the ellipse by more than a tenth of the uncertainty.
     """
     fit = scaled(motion.damping.best)
-    joint, apart = fit.joint, np.abs(np.tril(fit.joint.correlation, -1))
-    second, first = map(int, np.unravel_index(int(np.argmax(apart)), apart.shape))
+    joint, size = fit.joint, np.abs(np.tril(fit.joint.correlation, -1))
+    second, first = map(int, np.unravel_index(int(np.argmax(size)), size.shape))
     pair = [first, second]
     covariance = joint.covariance[np.ix_(pair, pair)]
-    if first == second or not np.diag(covariance).all() or not apart[second, first] < 1.0 - EPS:
+    if first == second or not np.diag(covariance).all() or not size[second, first] < 1.0 - EPS:
         return None
     turns = np.linspace(0.0, 2.0 * np.pi, DIRECTIONS + 1)
     # One standard uncertainty in every direction, so that the search begins with steps of like size.
@@ -66,9 +67,10 @@ def contour(motion: Oscillation, scales: tuple[float, float], shares: tuple[floa
         return np.stack([found[joint.names[i]][0] for i in pair], axis=-1)
 
     if motion.method == "windows":
-        rise = _rise(motion, fit, pair)
-        found = np.array([[_radius(rise, step, level) for step in reach] for level in levels])
-        profiles = None if np.all(np.abs(found - radii) <= NEGLIGIBLE) else border(found)
+        rise, far = _rise(motion, fit, pair), levels.max()
+        apart = [_radius(rise, step, far) - math.sqrt(far) for step in reach[::PROBED]]
+        if not max(map(abs, apart)) <= NEGLIGIBLE:
+            profiles = border(np.array([[_radius(rise, step, level) for step in reach] for level in levels]))
     return Contour(
         names=(joint.names[first], joint.names[second]),
         units=(joint.units[first], joint.units[second]),

@@ -17,7 +17,7 @@ from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.bench.spring import unstated_spring_kg
 from pipeline.checks.residual import Misfit
 from pipeline.damping.average import Weighted, average_over_laws, scaled
-from pipeline.damping.law_fit import LawFit, mean_squared_rate
+from pipeline.damping.law_fit import LawFit
 from pipeline.damping.laws import Drag, Law, free_power
 from pipeline.damping.laws.drag import COEFFICIENTS
 from pipeline.damping.local import local_decay
@@ -232,7 +232,7 @@ def _of_motion(
     return {
         "phase_slope": slope,
         "small_swings": None if small is None else inputs.add("small_swings", small, "A", free),
-        "squared_rate": laws.squared_rate if phase.squared_rate is None else phase.squared_rate,
+        "squared_rate": fitted.squared_rate,
         "time_factor": inputs.add("clock_rate", instrument.clock_rate, "B") * (1.0 + amiss["clock"]),
         "amplitude_factor": less_certain("amplitude", laws.values[0]),
         "rate_factor": less_certain("damping_rate", laws.values[1]),
@@ -340,7 +340,6 @@ class _Laws:
         ahead = not damping.admissible and self.weighted[0].weight >= LIMIT
         self.quoted = damping.by_statement or damping.settled or ahead
         self.shown = best if self.quoted else self.stated
-        self.squared_rate = mean_squared_rate(best, best.amplitude(elapsed))
         each = np.array([values for _, values, _ in found])
         weights = np.array([one.weight for one in self.weighted])
         weights /= weights.sum()

@@ -63,6 +63,7 @@ def tabulate(track: Track, fitted: Oscillation, scene: Scene) -> tuple[Effect, .
     return (
         *_masses(scene, counted),
         _disc_drag(scene, damping, omega.value, unit),
+        _damping(fitted),
         _bend(fitted),
         _rest_drift(fitted.rest, fitted.windows.noise),
         *_modes(fitted.modes, unit),
@@ -175,6 +176,14 @@ def _disc_drag(scene: Scene, damping: Damping, omega: float, unit: str) -> Effec
     return Effect("disc_drag", predicted, measured, "1/s", len(damping.best.law.parameters) > 1, why)
 
 
+def _damping(fitted: Oscillation) -> Effect:
+    """Return by how much damping makes the period longer, :math:`\\omega_0/\\omega - 1`."""
+    omega = fitted.phase.angular_frequency.value
+    longer = math.sqrt(1.0 + max(fitted.squared_rate, 0.0) / omega**2) - 1.0
+    why = "makes the period longer by this share, 1/8Q^2 for linear drag; the spring constant allows for it"
+    return Effect("damping", None, longer, "1", longer > 0.0, why)
+
+
 def _bend(fitted: Oscillation) -> Effect:
     name, bend, shift = "amplitude_dependent_frequency", fitted.phase.bend, fitted.shift
     if bend is None:
@@ -193,7 +202,7 @@ def _bend(fitted: Oscillation) -> Effect:
 def _rest_drift(rest: RestPosition, noise: float) -> Effect:
     unit = rest.mean.unit
     if not rest.drifts:
-        why = f"a constant rest position describes the record (noise of one sample {amount(noise, unit)})"
+        why = f"a constant rest position describes the record (residuals within single periods {amount(noise, unit)})"
         return Effect("rest_drift", None, rest.drift, unit, False, why)
     why = "the rest position moves more than its scatter allows; it is followed by a smooth curve"
     return Effect("rest_drift", None, rest.drift, unit, True, why)

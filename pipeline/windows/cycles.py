@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.notice import Refusal
 from pipeline.numerics.levels import IMPROBABLE, MISFIT, NEGLIGIBLE
 from pipeline.numerics.robust import mad_sigma, median
 from pipeline.samples.condition import GAP, Samples
 from pipeline.track import F8
-from pipeline.units import amount, noun
 
 # Periods below which the line's negative-frequency image shifts the spectrum's peak: measured on sines of any phase, by
 # up to 8 % at two periods, 1 % at three and 0.05 % at four.
@@ -41,14 +41,7 @@ class Cycles:
     periods: int = 1  # number of periods in a window
 
 
-@dataclass(frozen=True, slots=True)
-class NoOscillation:
-    """The reason why no oscillation was found in a record."""
-
-    why: str  # reason, in one sentence
-
-
-def find_cycles(samples: Samples) -> Cycles | NoOscillation:
+def find_cycles(samples: Samples) -> Cycles | Refusal:
     """Find the oscillation's frequency and slice the record into windows of one period or, with noise, several.
 
     The latter states the reason: nothing moves, no peak exceeds the noise, or the record spans under 1.5 periods.
@@ -72,20 +65,14 @@ def find_cycles(samples: Samples) -> Cycles | NoOscillation:
     spread = high - low
     resolution = samples.quantum or 0.0
     if spread <= max(3.0 * resolution, 1e-12 * max(high, -low)):
-        return NoOscillation(
-            f"the {noun(track.unit)} stays within {amount(spread, track.unit, '.3g')} at "
-            f"{amount(median(y), track.unit, '.4g')}: the sensor saw something at rest"
-        )
+        return Refusal("still", {"spread_m": spread, "level_m": median(y)})
     line = _uneven_line(t, y) or _spectral_line(t, y, track.t, track.rate_hz)
     if line is None:
         middle = median(y)
         if mad_sigma(y - middle) <= MISFIT * samples.noise:
-            at = amount(middle, track.unit, ".4g")
-            return NoOscillation(
-                f"the {noun(track.unit)} stays at {at}, but for noise: the sensor saw something at rest"
-            )
-        return NoOscillation("no line stands out of the spectrum's noise: there is no oscillation to be seen")
-    if isinstance(line, NoOscillation):
+            return Refusal("steady", {"level_m": middle})
+        return Refusal("no_line")
+    if isinstance(line, Refusal):
         return line
     frequency_hz, amplitude = line
     duration_s = float(t[-1] - t[0]) + 1.0 / track.rate_hz
@@ -93,18 +80,18 @@ def find_cycles(samples: Samples) -> Cycles | NoOscillation:
         frequency_hz = _least_left(t, y, frequency_hz)
     count = duration_s * frequency_hz
     if count < 1.5:
-        return NoOscillation(f"the recording spans only {count:.2g} periods, and at least 1.5 are needed")
+        return Refusal("few_periods", {"periods": count})
     needed = max(SAMPLES_PER_WINDOW, 2.0 * (samples.noise / (U_PHASE * max(amplitude, 1e-300))) ** 2)
     periods = max(1, math.ceil(needed * frequency_hz / track.rate_hz), math.ceil(count / MOST_WINDOWS))
     periods = min(periods, max(1, int(count)))
     return Cycles(frequency_hz, count, _bounds(track.t, used, frequency_hz, track.rate_hz, periods), periods)
 
 
-def _spectral_line(t: F8, y: F8, recorded: F8, rate_hz: float) -> tuple[float, float] | NoOscillation | None:
+def _spectral_line(t: F8, y: F8, recorded: F8, rate_hz: float) -> tuple[float, float] | Refusal | None:
     """Return the frequency, Hz, and mean amplitude, m, of the strongest line; None if it may be noise."""
     n = max(round(float(t[-1] - t[0]) * rate_hz) + 1, 8)
     if n > 50 * t.size:
-        return NoOscillation(f"{t.size} samples are spread over {n} sample intervals: too thin to find a period")
+        return Refusal("thin", {"samples": float(t.size), "intervals": float(n)})
     ordinal = np.arange(n, dtype=np.float64)
     grid = t[0] + ordinal / rate_hz
     # Times that are equally spaced except for rounding need no interpolation.

@@ -221,11 +221,13 @@ def _print_together(runs: Sequence[Run], options: AnalyseOptions) -> None:
 def _write(folder: Path, runs: Sequence[Run], options: AnalyseOptions) -> int:
     """Write the report, and return an exit code: a folder that takes none costs one line, and not the result."""
     from springmass.report.write import write_report
+    from springmass.terminal.progress import counted_figures
 
     template = options.template if len(runs) == 1 else None
     try:
         make_folder(folder.parent)
-        LOG.info(f"report: {write_report(folder, runs, figures=options.figures, template=template)}")
+        page = write_report(folder, runs, figures=options.figures, template=template, counting=counted_figures)
+        LOG.info(f"report: {page}")
     except (ProgramError, WriteFailed) as error:
         LOG.warning(f"{error}; --no-report writes no files")
         return USAGE

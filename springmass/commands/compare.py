@@ -100,9 +100,16 @@ def compare(
         _print_text(compared, runs)
     if out is not None:
         from springmass.report.write import write_report
+        from springmass.terminal.progress import counted_figures
 
         page = write_report(
-            out, runs, compared=compared, summary=result, figures=options.figures, template=options.template
+            out,
+            runs,
+            compared=compared,
+            summary=result,
+            figures=options.figures,
+            template=options.template,
+            counting=counted_figures,
         )
         LOG.info(f"report: {page}")
         LOG.log(HINT, f"open {page} in a browser")

@@ -48,7 +48,7 @@ def trade(
         analysis = Run.of(recording, given_scene, AnalysisOptions(**reading.options.given())).analysis
         analysis.track.demand_length("a simulation of the motion")
         if (found := analysis.oscillation) is None:
-            raise ProgramError(f"{recording}: {analysis.motion.why}", "name a run that oscillates", UNREADABLE)
+            raise ProgramError(f"{recording}: {analysis.why}", "name a run that oscillates", UNREADABLE)
         motion = motion_of(analysis, found)
     elif given_scene is not None:
         from springmass.simulations.simulation import prepare

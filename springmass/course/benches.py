@@ -114,8 +114,8 @@ def _run(row: Mapping[str, Any], bench: str, *, alone: bool) -> CourseRun:
         )
     return CourseRun(
         name=name,
-        spring=_label(row, "spring", "spring_mass_kg"),
-        disc=_label(row, "disc", "disc_diameter_m"),
+        spring=spring_of(row),
+        disc=disc_of(row),
         bench=str(row.get(bench) or ""),
         spring_constant=spring_constant,
         drag=None if middle is None else Estimate(float(middle[2]), float(middle[3])),
@@ -127,9 +127,20 @@ def _run(row: Mapping[str, Any], bench: str, *, alone: bool) -> CourseRun:
     )
 
 
-def _label(row: Mapping[str, Any], tag: str, scene: str) -> str:
-    label = row.get(scene) if row.get(tag) is None else row[tag]
-    return "" if label is None else str(label)
+def spring_of(row: Mapping[str, Any]) -> str:
+    """Return the name of a run's spring, or else its mass."""
+    return _label(row.get("spring"), row.get("spring_mass_kg"), "g")
+
+
+def disc_of(row: Mapping[str, Any]) -> str:
+    """Return the name of a run's disc, or else its diameter."""
+    return _label(row.get("disc"), row.get("disc_diameter_m"), "mm")
+
+
+def _label(tag: Any, value: float | None, thousandth: str) -> str:
+    if tag is not None:
+        return str(tag)
+    return "" if value is None else f"{1e3 * value:.10g} {thousandth}"
 
 
 def _estimate(row: Mapping[str, Any], name: str) -> Estimate | None:

@@ -16,7 +16,7 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.several.course import LITTLE
 from springmass.charts.chart import Chart
 from springmass.charts.several import CourseValue, course, drag_map
-from springmass.course.benches import BENCHES, CourseComparison
+from springmass.course.benches import BENCHES, CourseComparison, disc_of
 from springmass.course.results_csv import COURSE, FAILED
 from springmass.result.advice import sentence
 from springmass.terminal.printing import visible_lines
@@ -90,7 +90,8 @@ def _of_all(
             if row.get(name) is not None
         ]
         if len(values) > 1:
-            means = [x.mean for x in comparison.agreements if x.quantity == name] if comparison is not None else []
+            agreements = () if comparison is None else comparison.agreements
+            means = [x.mean for x in agreements if x.quantity == name and x.mean is not None]
             return course(label, by or "run", values, differing, means[0] if len(means) == 1 else None)
     return None
 
@@ -98,11 +99,7 @@ def _of_all(
 def _of_drag(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
     """Return the map of the drag coefficients of all runs that have some."""
     return drag_map(
-        [
-            (row.get("disc") or f"{1e3 * row['disc_diameter_m']:.4g} mm", np.array(json.loads(points)))
-            for row in rows
-            if (points := row.get("drag_points"))
-        ]
+        [(disc_of(row), np.array(json.loads(points))) for row in rows if (points := row.get("drag_points"))]
     )
 
 

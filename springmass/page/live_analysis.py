@@ -47,7 +47,7 @@ def motion_message(found: Run | NotYet, wanted_u_s: float | None = None, *, char
     graver = [f for f in analysis.findings if f.severity != "info"]
     message: dict[str, Any] = {
         "type": "motion",
-        "why": "" if motion is not None else analysis.motion.why,
+        "why": "" if motion is not None else analysis.why,
         "accuracy": found.how.accuracy,
         "t_s": float(np.nanmax(times)),
         "findings": [picked(f, ("code", "severity", "message", "advice")) for f in graver],

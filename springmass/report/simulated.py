@@ -17,7 +17,7 @@ from springmass.simulations.run_files import write_states
 from springmass.simulations.simulation import Simulation, beside_measured, summary
 
 if TYPE_CHECKING:
-    from springmass.charts.draw import PictureFormat
+    from springmass.charts.draw import Counting, PictureFormat
 
 SIMULATION_PAGE = "simulation.html"
 FIGURES = ("position", "velocity", "energy", "phase", "error", "band", "against")
@@ -27,7 +27,9 @@ FILES = frozenset(
 )
 
 
-def write(out: str | Path, simulation: Simulation, figures: Sequence[PictureFormat] = ()) -> Path:
+def write(
+    out: str | Path, simulation: Simulation, figures: Sequence[PictureFormat] = (), counting: Counting = iter
+) -> Path:
     """Write run file, page of charts, tables, JSON and the kinds of figures into NAME.simulated; return the folder."""
     from springmass.charts.draw import save
     from springmass.report.html import Figures, drawn_by_script, template
@@ -46,7 +48,8 @@ def write(out: str | Path, simulation: Simulation, figures: Sequence[PictureForm
     with whole_folder(target, FILES, "simulation.json") as folder:
         title = f"{where} by {simulation.solution.integrator.name}"
         write_states(folder / "run.h5", simulation, title)
-        drawn = Figures(save(charts, make_folder(folder / "figures"), figures) if figures else {})
+        named = {chart.name: chart for chart in charts}
+        drawn = Figures(save(named, make_folder(folder / "figures"), figures, counting) if figures else {})
         shown = [drawn.add(chart) for chart in charts]
         beside = beside_measured(simulation)
         page = template("charts.html.j2").render(

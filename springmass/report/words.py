@@ -117,7 +117,7 @@ def summary(analysis: Analysis) -> tuple[tuple[str, str], ...]:
     ordered = sorted(warnings, key=lambda f: harm_of(f.code, f.severity))
     to_do = ordered[0].advice if ordered else ""
     if motion is None:
-        why = sentence(typeset(analysis.motion.why))
+        why = sentence(typeset(analysis.why))
         if isinstance(analysis.motion, Rest):
             why = "Nothing oscillates in this recording; it gives mean and noise only."
         return (("Result", why), *((("What to do", to_do),) if to_do else ()))

@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args
 
 from acquisition.regular_file import open_regular_text
 from springmass.charts.chart import Chart
-from springmass.charts.draw import PictureFormat, save
+from springmass.charts.draw import Counting, PictureFormat, save
 from springmass.charts.run import CHARTS, charts_of
 from springmass.charts.several import comparison, masses, overlay, static
 from springmass.comparing.comparison import SpringComparison, comparison_words
@@ -44,6 +44,7 @@ def write_report(
     figures: Sequence[PictureFormat] = (),
     template: Literal["latex"] | None = None,
     script: str = "",
+    counting: Counting = iter,
 ) -> Path:
     """Write the report of one run, or of several side by side; return its page, which exists once it is complete.
 
@@ -52,7 +53,7 @@ def write_report(
     ``figures/``; if SVG is among them, the page shows them to viewers that run no script. ``template`` asks for
     ``lab-report.tex``, whose figures are PDF. ``script`` is the address of a script that several reports share; without
     one the page contains it. If there are several runs, the names of figures and motions begin with the name of the
-    run.
+    run. ``counting`` shows how many figures are drawn.
     """
     directory, stems = Path(directory), _stems([run.name for run in runs])
     pdf: tuple[PictureFormat, ...] = ("pdf",) if template is not None else ()
@@ -82,8 +83,9 @@ def write_report(
         pictures: dict[str, bytes] = {}
         if kinds:
             (folder / "figures").mkdir()
-            for stem, of_run in (("", several), *zip(stems, charts, strict=True)):
-                pictures |= save(of_run.values(), folder / "figures", kinds, stem)
+            named = zip(["", *stems], [several, *charts], strict=True)
+            drawn = {f"{stem}{name}": chart for stem, some in named for name, chart in some.items()}
+            pictures = save(drawn, folder / "figures", kinds, counting)
         for stem, analysis, smoothed in zip(stems, analyses, motions, strict=True):
             if not isinstance(smoothed, str):
                 write_whole(folder / f"{stem}motion.csv", motion_csv(analysis, smoothed))

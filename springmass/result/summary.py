@@ -77,7 +77,7 @@ def _head(analysis: Analysis, name: str) -> str:
     span = float(np.nanmax(track.t) - np.nanmin(track.t))
     words = f"{name or 'run'}: {track.kind}, {len(track)} samples in {span:.4g} s, "
     words += f"{analysis.quality['used']} used"
-    return words if analysis.ok else f"{words}; {analysis.motion.why}"
+    return words if analysis.ok else f"{words}; {analysis.why}"
 
 
 def _law(damping: Damping) -> str:

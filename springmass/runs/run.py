@@ -164,7 +164,7 @@ class Run(Mapping[str, Estimate]):
     @property
     def why(self) -> str:
         """Why the run is not ``ok``, as a sentence; empty if it is."""
-        return "" if self.ok else self.analysis.motion.why
+        return "" if self.ok else self.analysis.why
 
     @property
     def law(self) -> str | None:
@@ -239,7 +239,7 @@ class Run(Mapping[str, Estimate]):
         drawn = CHARTS[chart](self.analysis)
         if drawn is None:
             if self.analysis.oscillation is None:
-                raise AnalysisError(f"only its position can be drawn, nothing oscillates: {self.analysis.motion.why}")
+                raise AnalysisError(f"only its position can be drawn, nothing oscillates: {self.analysis.why}")
             needs = {
                 "drag": "[bob] mass_kg, [disc] diameter_m and an amplitude that falls",
                 "contour": "a damping law of two parameters",

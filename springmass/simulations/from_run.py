@@ -69,7 +69,7 @@ def oscillation_of(analysis: Analysis) -> Oscillation:
     """Return the oscillation of a run; refuse a run without one."""
     if (motion := analysis.oscillation) is None:
         raise ProgramError(
-            f"{analysis.motion.why}: nothing to lay a prediction over", "name a run that oscillates", UNREADABLE
+            f"{analysis.why}: nothing to lay a prediction over", "name a run that oscillates", UNREADABLE
         )
     return motion
 

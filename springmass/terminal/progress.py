@@ -6,7 +6,7 @@ import contextlib
 import logging
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from datetime import timedelta
 from typing import TypeVar
 
@@ -60,3 +60,8 @@ def counted(items: Iterable[Item], total: int, what: str) -> Iterator[Item]:
         for done, item in enumerate(items, 1):
             yield item
             update(done)
+
+
+def counted_figures(charts: Collection[Item]) -> Iterator[Item]:
+    """Yield charts to be drawn, and show on a terminal how many are."""
+    return counted(charts, len(charts), "figures")

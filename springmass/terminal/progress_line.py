@@ -67,7 +67,7 @@ def _parts(progress: Progress, style: TerminalStyle) -> list[str]:
         form, estimates = concise if style.terminal else shown, motion.analysis.estimates
         parts += [f"T {form(estimates['period'], style)}", f"A {form(estimates['amplitude'], style)}"]
     else:
-        parts.append(motion.analysis.motion.why)
+        parts.append(motion.analysis.why)
     parts.append(f"{progress.rate_hz:.0f} Hz")
     parts.append(f"{progress.missing} missing" + (f", {progress.gaps} gaps" if progress.gaps else ""))
     if progress.status is not None:

@@ -100,7 +100,7 @@ class Opened:
             case "figures":
                 charts, pictures = charts_of(run.analysis, notes_of(run.recorded), profiles=True), folder / "figures"
                 pictures.mkdir(exist_ok=True)
-                save(charts.values(), pictures, ("png", "svg"))
+                save(charts, pictures, ("png", "svg"))
                 with zipfile.ZipFile(folder / "figures.zip", "w", zipfile.ZIP_DEFLATED) as archive:
                     for picture in sorted(pictures.iterdir()):
                         archive.write(picture, picture.name)

@@ -53,6 +53,9 @@ def test_drag_by_hand() -> None:
     assert bench["disc_drag"].predicted == pytest.approx(4 * drag_per_m * 8.0 * 0.05 / (3 * math.pi), rel=5e-3)
     assert bench["disc_drag"].measured == pytest.approx(0.007 + 0.2 * 0.05, rel=0.02)
     assert bare["disc_drag"].predicted is None
+    longer = bench["damping"].measured
+    assert longer is not None
+    assert 0.5 * (0.007 / 8) ** 2 < longer < (0.017 / 8) ** 2
 
 
 def test_buoyancy_by_hand() -> None:
