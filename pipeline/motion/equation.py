@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
+from numpy.polynomial import Legendre
 
 from pipeline.damping.law_fit import least_chi2, mean_squared_rate, weigh
 from pipeline.damping.laws.drag import COEFFICIENTS, DRAGS, Drag
@@ -23,6 +24,7 @@ from pipeline.dynamics.equation import Equation, Problem, Real
 from pipeline.dynamics.integrator import Trajectory
 from pipeline.dynamics.strang import STRANG
 from pipeline.modes.mode import Modes
+from pipeline.motion.by_samples import FEW_WINDOWS
 from pipeline.motion.fit import Rows, allowed, clipped, fit
 from pipeline.motion.fitted import Oscillation, Phase, RestPosition, Waveform, wrapped
 from pipeline.notice import Refusal
@@ -202,7 +204,10 @@ def fit_equation(samples: Samples, windows: Windows, damping: Damping) -> Oscill
     # An average of samples has less noise between neighbours than about a sinusoid, which in turn errs where damping is
     # strongest: the quarter of the windows that it fits best shows the noise.
     every, most = rows, allowed(expected, float(np.quantile(windows.noises, 0.25)))
-    for starts in (_by_amplitude(models, windows, damping), _by_first_samples(models, rows, windows.angular_frequency)):
+    ways = [_by_amplitude(models, windows, damping)]
+    if windows.t.size < FEW_WINDOWS:
+        ways.append(_by_first_samples(models, rows, windows.angular_frequency))
+    for starts in ways:
         start = _nearest(models[-1], every, starts)
         found, rows = clipped(models[-1], every, start[models[-1].slots], least=expected, rounds=3)
         left, count = rows.left(models[-1], found.values)[rows.used], found.values.size
@@ -424,7 +429,7 @@ def _described(
     noises = np.full(windows.noises.shape, rms)
     windows = replace(windows, flags=flags, residual=residual, noises=noises)
     # The rest position is the constant one of the record; the place where friction holds the bob may differ.
-    rest = RestPosition(Estimate(still, float(u[0]), unit), 0.0, False, t, np.full(t.size, still))
+    rest = RestPosition(Estimate(still, float(u[0]), unit), Legendre([still]))
     waveform = Waveform(position, partial(np.asarray, model.motion.velocity(rows.t, theta)), residual, rms)
     return Oscillation(
         windows=windows,
