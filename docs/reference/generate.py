@@ -22,7 +22,7 @@ from pipeline.results.formulas import FORMULAS
 from springmass.commands import COMMANDS, app
 from springmass.commands.options import HOW_READ, THE_PAGE
 from springmass.comparing.comparison import ComparisonResult
-from springmass.result.run_json import RESULT_SCHEMA, RunResult, Stated
+from springmass.result.run_json import RESULT_SCHEMA, NumberWithU, RunResult
 
 PAGE = Path(__file__).with_name("command-line.md")
 FINDINGS_PAGE = Path(__file__).with_name("findings.md")
@@ -208,9 +208,9 @@ def findings_page() -> str:
 
 def results_schema(page: str) -> dict[str, Any]:
     """Return the JSON Schema of results from the types that write them, with the meanings that the page gives them."""
-    types = [RunResult, ComparisonResult, Stated]
+    types = [RunResult, ComparisonResult, NumberWithU]
     (run, comparison, _), definitions = msgspec.json.schema_components(
-        types, schema_hook={Estimate: {"$ref": "#/$defs/Stated"}}.__getitem__, ref_template="#/$defs/{name}"
+        types, schema_hook={Estimate: {"$ref": "#/$defs/NumberWithU"}}.__getitem__, ref_template="#/$defs/{name}"
     )
     for definition in definitions.values():
         if any("default" in each for each in definition["properties"].values()):  # a dataclass: all of it is written

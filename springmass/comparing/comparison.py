@@ -87,7 +87,7 @@ class JointLaws(TypedDict):
     laws: Mapping[str, JointLaw]
 
 
-class Line(TypedDict):
+class LineOfMasses(TypedDict):
     """The line through the squared periods of several masses."""
 
     constant: Estimate
@@ -110,7 +110,7 @@ class ComparisonResult(TypedDict):
     comparison: Springs
     joint_damping: Sequence[JointLaws]
     findings: Sequence[Finding]
-    mass_line: NotRequired[Line]
+    mass_line: NotRequired[LineOfMasses]
     hooke: NotRequired[HookesLaw]
     reported: NotRequired[Sequence[Reported]]
     runs: Sequence[RunResult]
@@ -298,7 +298,7 @@ def comparison_json(compared: SpringComparison, provenance: Provenance) -> dict[
         "provenance": provenance,
     }
     if compared.line is not None:
-        content["mass_line"] = fields_of(Line, compared.line)
+        content["mass_line"] = fields_of(LineOfMasses, compared.line)
     if compared.hooke is not None:
         content["hooke"] = {"constant": compared.hooke.constant, "normalised_error": compared.normalised_error}
     if compared.reported:

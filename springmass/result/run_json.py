@@ -27,7 +27,7 @@ RESULT_SCHEMA: Final = 3
 EXPANDED = ("dof", "coverage_factor", "expanded")  # of a budget, for its expanded uncertainty
 
 
-class Input(TypedDict):
+class RecordingInput(TypedDict):
     """What was read."""
 
     path: str
@@ -40,14 +40,14 @@ class Input(TypedDict):
     duration_s: float
 
 
-class Mark(TypedDict):
+class RecordedMark(TypedDict):
     """A mark of a recording."""
 
     t_s: float
     text: str
 
 
-class Event(TypedDict):
+class RecordedEvent(TypedDict):
     """What happened while recording."""
 
     t_s: float
@@ -60,12 +60,12 @@ class Recorded(TypedDict):
 
     start_time: str | None
     calibration: Mapping[str, Any]
-    events: Sequence[Event]
-    marks: Sequence[Mark]
+    events: Sequence[RecordedEvent]
+    marks: Sequence[RecordedMark]
     notes: Sequence[str]
 
 
-class Stated(TypedDict):
+class NumberWithU(TypedDict):
     """A number with its standard uncertainty."""
 
     value: float
@@ -87,7 +87,7 @@ class BudgetInput(TypedDict):
     dof: float
 
 
-class ResultBudget(Stated):
+class ResultBudget(NumberWithU):
     """The uncertainty of one result."""
 
     dof: float
@@ -103,7 +103,7 @@ class Correlations(TypedDict):
     matrix: Sequence[Sequence[float]]
 
 
-class Parameter(Stated):
+class Parameter(NumberWithU):
     """A parameter of a law."""
 
     determined: bool
@@ -169,7 +169,7 @@ class RunResult(Details):
     """The result of one run."""
 
     schema: Literal[3]
-    input: Input
+    input: RecordingInput
     recorded: Recorded
     quality: Mapping[str, int]
     estimates: Mapping[str, Estimate]
@@ -223,7 +223,7 @@ def provenance_of(accuracy: str, parameters: Mapping[str, Any], time_utc: str) -
     return {"version": __version__, "accuracy": accuracy, "parameters": dict(parameters), "time_utc": time_utc}
 
 
-def input_of(loaded: Loaded) -> Input:
+def input_of(loaded: Loaded) -> RecordingInput:
     """Return the ``input`` object: what was analysed."""
     track = loaded.track
     return {
@@ -326,7 +326,7 @@ def plain(value: object) -> Any:
     An estimate or a dataclass becomes a mapping of its fields, and a number that is not finite becomes null.
     """
     if isinstance(value, Estimate):
-        return plain(fields_of(Stated, value))
+        return plain(fields_of(NumberWithU, value))
     if isinstance(value, Mapping):
         return {str(key): plain(inner) for key, inner in value.items()}
     if is_dataclass(value) and not isinstance(value, type):
