@@ -1,11 +1,11 @@
-"""Blocks of consecutive samples, and the interface of everything that delivers them: ports, recordings, simulations."""
+"""Blocks of consecutive samples, and the description of what delivers them: a port, a recording or a simulation."""
 
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal, Protocol, Self
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -163,17 +163,3 @@ class SourceInfo:
     clock: ClockKind = "nominal"
     stated_error_m: float | None = None
     u_rate: float | None = None
-
-
-class Source(Protocol):
-    """An iterable of blocks, used inside a ``with`` statement; the iteration ends when the source ends."""
-
-    @property
-    def info(self) -> SourceInfo:
-        """The description of the source, available before the first sample."""
-
-    def __enter__(self) -> Self: ...
-
-    def __exit__(self, *_: object) -> None: ...
-
-    def __iter__(self) -> Iterator[Block]: ...

@@ -1,15 +1,15 @@
-"""Replay a recording through the interface of a live source."""
+"""Replay the samples of a recording in blocks, each when it is due, as a live source delivers them."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Self
 
 import numpy as np
 
-from acquisition.block import Block, Flag, SourceInfo, concatenate
+from acquisition.block import Block, Flag, SourceInfo
 from acquisition.clock import Clock
 
 READ_SAMPLES = 16
@@ -30,14 +30,14 @@ class Replay:
     >>> t = np.arange(20) / 100
     >>> run = Block(0, t, 0.2 + t, np.zeros(20, np.uint8))
     >>> info = SourceInfo("replay", "run", 100.0)
-    >>> with Replay([run], VirtualClock(), info=info) as source:
+    >>> with Replay(run, VirtualClock(), info=info) as source:
     ...     [len(block) for block in source]
     [16, 4]
     """
 
     def __init__(
         self,
-        blocks: Iterable[Block],
+        run: Block,
         clock: Clock,
         *,
         info: SourceInfo,
@@ -48,7 +48,7 @@ class Replay:
         if speed is not None and not speed > 0:
             raise ValueError(f"speed must be positive, or None to never wait, got {speed!r}")
         self.info = info if info.kind == "simulated" else replace(info, kind="replay")
-        self._run = concatenate(blocks)
+        self._run = run
         # Samples whose time is unknown or jumps back are due immediately.
         finite = self._run.t[np.isfinite(self._run.t)]
         self._due = np.fmax.accumulate(np.concatenate([finite[:1], self._run.t]))[finite[:1].size :]

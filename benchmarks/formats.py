@@ -135,7 +135,7 @@ def ratios(folder: Path, cold_rows: int, long_rows: int, lvm_rows: int) -> Itera
     long = write_motion_sensor(folder / "long.txt", long_rows)
     lvm = write_lvm(folder / "run.lvm", lvm_rows)
     loaded = load(long)
-    run = write_run(folder / "long.h5", loaded.samples_in_blocks(), loaded.info, originals=loaded.originals)
+    run = write_run(folder / "long.h5", [loaded.samples], loaded.info, originals=loaded.originals)
     del loaded
     yield Ratio(f"cold, {cold_rows} rows: ours / pandas.read_csv", 0.45, cold(OPEN, short), cold(PANDAS, short), 9)
     name = f"{cold_rows} rows, twenty times: ours / pandas.read_csv (C)"

@@ -103,7 +103,7 @@ class TextLinesDecoder(FramedDecoder):
         silent = self._column is None and _NO_TARGET.search(text) is not None
         number = None if silent else self._distance(line)
         silent = silent and self.resolution_m is not None
-        sequence = _whole(self._sequence, line, 1.0)
+        sequence = _whole(self._sequence, line)
         where: str | int | None = self._time
         if where is None and text.startswith(UPTIME):
             where = UPTIME[:-1]
@@ -271,13 +271,12 @@ def _counts(cell: int, lines: list[FoundNumber]) -> bool:
     return len(steps) >= 4 and min(steps) > 0 and sorted(steps)[3 * len(steps) // 4] <= 1.5 * min(steps)
 
 
-def _whole(where: int | str | None, line: FoundNumber, scale: float) -> int | None:
-    """Return the scaled whole number in a column; -1 without a column, None without a valid number of at least 0."""
+def _whole(where: int | str | None, line: FoundNumber) -> int | None:
+    """Return the number in a column, rounded; -1 without a column, None without a valid number of at least 0."""
     if where is None:
         return -1
     number = _at(where, line)
-    scaled = -1.0 if number is None else number.value * scale
-    return round(scaled) if 0 <= scaled < 2**63 else None
+    return round(number.value) if number is not None and 0 <= number.value < 2**63 else None
 
 
 class _PrintedClock:

@@ -75,17 +75,15 @@ def sniff(path: str | os.PathLike[str]) -> str:
     return _recognise(os.fspath(path), read_bytes(path, HEAD_BYTES)).name
 
 
-def open_recording(
-    path: str | os.PathLike[str], reading: ReadOptions = READ_DEFAULTS, *, format: str | None = None
-) -> Recording:
+def open_recording(path: str | os.PathLike[str], reading: ReadOptions = READ_DEFAULTS) -> Recording:
     """Read a recording of another program; if anything is missing or faulty, the error says so in one line.
 
-    By default the format is identified by content. ``reading`` states what the file does not state or leaves open. A
+    The format is identified by content. ``reading`` states what the file does not state or leaves open. A
     velocity file is joined with the position file by time. The separator of cells and the decimal mark of a text are
     found out unless they are stated.
     """
     name = os.fspath(path)
-    reader, original, data = _opened(name, format, reading)
+    reader, original, data = _opened(name, reading)
     of_format = replace(reading, velocity=None, delimiter=None, decimal=None)
     if reading.velocity is not None:
         read_pair = getattr(reader, "read_pair", None)
@@ -106,19 +104,19 @@ def open_recording(
 def inspect(path: str | os.PathLike[str], reading: ReadOptions = READ_DEFAULTS) -> Inspection:
     """Return the format and the content of a file, before a channel is chosen."""
     name = os.fspath(path)
-    reader, _, data = _opened(name, None, reading)
+    reader, _, data = _opened(name, reading)
     if not isinstance(reader, SurveyFormat):
         return Inspection(reader.name, reader.title, "", ())
     return Inspection(reader.name, reader.title, reader.evidence(data[:HEAD_BYTES]), reader.survey(name, data))
 
 
-def _opened(path: str, format: str | None, reading: ReadOptions) -> tuple[Format, bytes, bytes]:
+def _opened(path: str, reading: ReadOptions) -> tuple[Format, bytes, bytes]:
     """Return the format of a file, its bytes, and its bytes as they are to be read."""
     if reading.delimiter or reading.decimal:
         original = read_bytes(path)
         data = restated(path, original, reading.delimiter, reading.decimal)
-        return get_format(format) if format else _recognise(path, data[:HEAD_BYTES]), original, data
-    reader = get_format(format) if format else _recognise(path, read_bytes(path, HEAD_BYTES))
+        return _recognise(path, data[:HEAD_BYTES]), original, data
+    reader = _recognise(path, read_bytes(path, HEAD_BYTES))
     data = read_bytes(path)
     return reader, data, data
 

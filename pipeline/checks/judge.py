@@ -68,6 +68,9 @@ def judge(
             numbers.setdefault(one.code, {}).update(one.numbers)
     if "model_misfit" in numbers:
         numbers["model_misfit"]["scatter_excess_m"] = fitted.damping.scatter.excess or None
+    if "not_sinusoidal" in numbers:
+        on_spring = scene.hangs_on_spring and not samples.track.unit.startswith("rad")
+        numbers["not_sinusoidal"]["spring" if on_spring else "no_spring"] = ""
     found = tuple(Notice(code, each) for code, each in numbers.items())
     misfits = (*(one.misfit for one in outcomes), rounding(samples, fitted))
     return found, tuple(misfit for misfit in misfits if misfit is not None)

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
+from numpy.polynomial import Legendre
 
 from pipeline.damping.law_fit import least_chi2, mean_squared_rate, weigh
 from pipeline.damping.laws.drag import COEFFICIENTS, DRAGS, Drag
@@ -430,7 +431,7 @@ def _described(
     noises = np.full(windows.noises.shape, rms)
     windows = replace(windows, flags=flags, residual=residual, noises=noises)
     # The rest position is the constant one of the record; the place where friction holds the bob may differ.
-    rest = RestPosition(Estimate(still, float(u[0]), unit), 0.0, False, t, np.full(t.size, still))
+    rest = RestPosition(Estimate(still, float(u[0]), unit), Legendre([still]))
     waveform = Waveform(position, partial(np.asarray, model.motion.velocity(rows.t, theta)), residual, rms)
     return Oscillation(
         windows=windows,

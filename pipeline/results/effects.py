@@ -202,7 +202,7 @@ def _bend(fitted: Oscillation) -> Effect:
 def _rest_drift(rest: RestPosition, noise: float) -> Effect:
     unit = rest.mean.unit
     if not rest.drifts:
-        why = f"a constant rest position describes the record (noise of one sample {amount(noise, unit)})"
+        why = f"a constant rest position describes the record (residuals within single periods {amount(noise, unit)})"
         return Effect("rest_drift", None, rest.drift, unit, False, why)
     why = "the rest position moves more than its scatter allows; it is followed by a smooth curve"
     return Effect("rest_drift", None, rest.drift, unit, True, why)

@@ -115,7 +115,7 @@ def source(
         loaded = load(Path(what), read)
         loaded = loaded if given_scene is None else replace(loaded, scene=given_scene.to_mapping())
         pace = speed if math.isfinite(speed) else None
-        replay = Replay(loaded.samples_in_blocks(), _clock(speed), info=loaded.info, speed=pace)
+        replay = Replay(loaded.samples, _clock(speed), info=loaded.info, speed=pace)
         return _Played(replace(loaded, recording=replace(loaded.recording, info=replay.info)), replay)
     address = os.fspath(what)
     if not re.fullmatch(r"/dev/.*|.*://.*|COM\d+", address, re.IGNORECASE | re.DOTALL):

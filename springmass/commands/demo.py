@@ -53,7 +53,7 @@ def _one(name: str, out: Path) -> Run:
     old = load(data / f"{name}_simulated_position.txt", LoadOptions(velocity=velocity))
     scene = read_scene(data / f"{name}.scene.toml")
     path = out / f"{name}.h5"
-    with Replay(old.samples_in_blocks(), VirtualClock(), info=old.info, speed=None) as source:
+    with Replay(old.samples, VirtualClock(), info=old.info, speed=None) as source:
         save_run(path, old, blocks=source, scene=scene.to_mapping(), overwrite=True)
     (run,) = analysed([Task(str(path), name)])
     return run

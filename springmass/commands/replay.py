@@ -45,7 +45,7 @@ def replay(
     fast = math.isinf(speed)
     clock, pace = (VirtualClock(), None) if fast else (SystemClock(), speed)
     begin_s = -math.inf if seek is None else seek
-    with Replay(loaded.samples_in_blocks(), clock, info=loaded.info, speed=pace, from_s=begin_s, loop=loop) as source:
+    with Replay(loaded.samples, clock, info=loaded.info, speed=pace, from_s=begin_s, loop=loop) as source:
         samples = loaded.samples
         print("time_s", "distance_m" if samples.quantity == "length" else samples.quantity, "flags", sep="\t")
         for block in source:

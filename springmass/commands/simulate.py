@@ -126,7 +126,7 @@ def _described(simulation: Simulation, *, full: bool, given: bool) -> str:
         rows.append((row.label, str(row.value), str(row.measured), apart))
     lines += [aligned(rows), ""] if len(rows) > 1 else []
     if over is not None:
-        left = f"rms {over.rms_m * 1e3:.3g} mm, noise of a sample {over.noise_m * 1e3:.3g} mm"
+        left = f"rms {over.rms_m * 1e3:.3g} mm, noise of one sample {over.noise_m * 1e3:.3g} mm"
         lines += [f"against the run  {left}", *(deviation_text(over) if full else [])]
     lines.append(f"prediction       {_predicted(simulation)}")
     if full:

@@ -153,7 +153,7 @@ def _value(row: Reported, run: Run, others: Mapping[str, Run]) -> tuple[str, Not
     if row.name == "noise":
         if ours.value < TOO_SMALL * row.value and row.value < TOO_SMALL * ours.value:
             return "agrees", None, None
-        return "not the noise of a sample", Notice("reported_not_noise", about), None
+        return "not the noise of one sample", Notice("reported_not_noise", about), None
     linear = run.analysis.damping.fits.get("linear")
     if row.name in ("damping_rate", "gamma") and linear is not None and linear.rejection:
         if _agrees(run, row, ours):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -22,7 +22,6 @@ from springmass.loading.track import between, to_track
 from storage.run_file.reading import open_run
 
 UNVERIFIED = "unverified"
-SAMPLES_PER_BLOCK = 1024
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,11 +115,6 @@ class Loaded:
             where = self.source or "arrays"
             raise ProgramError(f"{where}: no sample lies between {low:g} and {high:g} s", f"the record {span}")
         return part
-
-    def samples_in_blocks(self) -> Iterator[Block]:
-        """Yield the samples in blocks."""
-        for start in range(0, len(self.samples), SAMPLES_PER_BLOCK):
-            yield self.samples[start : start + SAMPLES_PER_BLOCK]
 
 
 def sha256_of(path: Path) -> str:

@@ -43,7 +43,7 @@ def save_run(
     """Write a run file of an input with everything it states, its own bytes inside; ``blocks`` replace its samples."""
     return write_run(
         path,
-        loaded.samples_in_blocks() if blocks is None else blocks,
+        [loaded.samples] if blocks is None else blocks,
         loaded.info,
         originals=loaded.originals,
         scene=scene if scene is not None else loaded.scene,

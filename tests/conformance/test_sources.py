@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from acquisition.block import Block, Flag, Source, SourceInfo, concatenate
+from acquisition.block import Block, Flag, SourceInfo, concatenate
 from acquisition.clock import Clock, VirtualClock
 from acquisition.replay import Replay
 from acquisition.simulated import VirtualRangefinder, VirtualSensor
@@ -27,17 +27,17 @@ def run() -> Block:
     return Block(0, t, distance, flags, None, np.gradient(distance, t))
 
 
-def replay(speed: float | None) -> Callable[[Clock], Source]:
+def replay(speed: float | None) -> Callable[[Clock], Replay]:
     """Return a maker of replays at a speed."""
     info = SourceInfo("replay", "run", RATE_HZ, quantum_m=1e-5)
-    return lambda clock: Replay([run()[:4000], run()[4000:]], clock, info=info, speed=speed)
+    return lambda clock: Replay(run(), clock, info=info, speed=speed)
 
 
-def simulated(clock: Clock) -> Source:
+def simulated(clock: Clock) -> Replay:
     """Return a simulated source with noise, false echoes and readings without a target."""
     sensor = VirtualSensor(rate_hz=RATE_HZ, false_echo_rate_hz=0.5, dead_time_s=1.17e-3)
     bob = VirtualRangefinder(lambda t: 0.25 + 0.05 * math.sin(7.9 * t), sensor, np.random.default_rng(1))
-    return Replay([bob.block(SECONDS)], clock, info=bob.info("run"))
+    return Replay(bob.block(SECONDS), clock, info=bob.info("run"))
 
 
 REPLAYS = {"replay-1x": replay(1.0), "replay-10x": replay(10.0), "replay-max": replay(None)}

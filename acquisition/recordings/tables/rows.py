@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import zip_longest
 
 import numpy as np
@@ -38,8 +37,7 @@ def read_rows(
     The cells of columns ``clocks`` are times of day or durations; those of ``words`` are kept as text too.
     """
     first = min(first, stop)
-    pieces: list[list[tuple[F8, I1, B1]]] = []  # for each column
-    sizes: list[int] = []
+    pieces: list[list[tuple[int, F8, I1, B1]]] = []  # for each column, each from a row on
     cells_of: dict[int, list[bytes]] = {at: [] for at in (*clocks, *words)}
     numbers = [np.empty(0, np.int64)]
     most, count, number, last = int(text.starts[stop] - text.starts[first]) + _MOST_EMPTY, 0, first + 1, []
@@ -56,15 +54,10 @@ def read_rows(
         for at, cells in enumerate(zip_longest(*rows, fillvalue=b"")):
             if at == len(pieces):
                 pieces.append([])
-                sizes.append(0)
-            if missing := count - sizes[at]:
-                empty = np.full(missing, np.nan), np.full(missing, EMPTY_CELL, np.int8), np.zeros(missing, bool)
-                pieces[at].append(empty)
-            pieces[at].append(read_cells(cells))
+            pieces[at].append((count, *read_cells(cells)))
             if at in cells_of:
                 cells_of[at] += [b""] * (count - len(cells_of[at])) + list(cells)
-            sizes[at] = count + len(rows)
-            for row in np.flatnonzero(pieces[at][-1][1] == UNREAD_CELL).tolist():
+            for row in np.flatnonzero(pieces[at][-1][2] == UNREAD_CELL).tolist():
                 if THOUSANDS.fullmatch(cells[row]):
                     shown = cells[row].decode("utf-8", "replace")
                     problem = f'expected plain numbers, got a thousands separator in "{shown}"'
@@ -72,15 +65,17 @@ def read_rows(
         count, last = count + len(rows), rows[-1]
     columns: list[Column] = []
     commas: list[B1] = []
-    for of_column in pieces:
-        values, decimals, comma = (np.concatenate(each) for each in zip(*of_column, strict=True))
+    for at, of_column in enumerate(pieces):
+        size = of_column[-1][0] + of_column[-1][1].size
+        values, decimals, comma = np.full(size, np.nan), np.full(size, EMPTY_CELL, np.int8), np.zeros(size, bool)
+        for begin, of_page, forms, commas_of_page in of_column:
+            span = slice(begin, begin + of_page.size)
+            values[span], decimals[span], comma[span] = of_page, forms, commas_of_page
         of_column.clear()
-        if len(columns) in clocks:
-            values, decimals = clock_times(cells_of[len(columns)])
-        columns.append(Column("", "", values, decimals))
-        if len(columns) - 1 in words:
-            as_text = np.array([decode(cell).strip('"') for cell in cells_of[len(columns) - 1]])
-            columns[-1] = replace(columns[-1], words=as_text)
+        if at in clocks:
+            values, decimals = clock_times(cells_of[at])
+        as_text = np.array([decode(cell).strip('"') for cell in cells_of[at]]) if at in words else None
+        columns.append(Column("", "", values, decimals, words=as_text))
         commas.append(comma)
     traps = _decimal_marks(path, columns, commas)
     ended = first >= stop or stop < len(text) or text.ended

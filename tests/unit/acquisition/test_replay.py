@@ -20,16 +20,16 @@ def run(count: int = 100) -> Block:
 
 def test_it_begins_at_a_time_of_the_recording() -> None:
     """At once and without a gap; behind the end there is nothing."""
-    block = next(iter(Replay([run()], clock := VirtualClock(), info=INFO, from_s=0.5)))
+    block = next(iter(Replay(run(), clock := VirtualClock(), info=INFO, from_s=0.5)))
     assert (block.first, block.t[0], clock.now_ns(), block.flags.any()) == (0, 0.5, 150_000_000, False)
-    assert list(Replay([run()], VirtualClock(), info=INFO, from_s=99.0)) == []
+    assert list(Replay(run(), VirtualClock(), info=INFO, from_s=99.0)) == []
 
 
 def test_a_loop_has_a_gap_before_each_further_turn() -> None:
     """Record time restarts, the index goes on, the pace holds, and nothing wraps in silence."""
     clock = VirtualClock()
     whole = run(16)
-    replay = Replay([whole], clock, info=INFO, loop=True)
+    replay = Replay(whole, clock, info=INFO, loop=True)
     turns = [(block, clock.now_ns()) for block, _ in zip(replay, range(3), strict=False)]
     assert [(block.first, now_ns) for block, now_ns in turns] == [
         (0, 150_000_000),
