@@ -20,7 +20,15 @@ from pipeline.damping.laws import LAWS, Drag, Law, in_units, units_of
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.least_squares import Fit
-from pipeline.numerics.levels import BARE_MENTION, COVERAGE, FALSE_ALARM, NEGLIGIBLE, STRONG, VERY_STRONG, normal_quantile
+from pipeline.numerics.levels import (
+    BARE_MENTION,
+    COVERAGE,
+    FALSE_ALARM,
+    NEGLIGIBLE,
+    STRONG,
+    VERY_STRONG,
+    normal_quantile,
+)
 from pipeline.numerics.regression import chi2_quantile, solve_weighted
 from pipeline.track import F8
 
