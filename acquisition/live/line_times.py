@@ -10,8 +10,8 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -63,11 +63,6 @@ class LineClock:
     u_rate_ppm: float
     read_s: float
     lost: int = 0
-
-    def to_mapping(self) -> dict[str, Any]:
-        """Return the facts as plain data, with None for what is not known."""
-        facts = asdict(self)
-        return {name: None if isinstance(x, float) and not math.isfinite(x) else x for name, x in facts.items()}
 
     def described(self, info: SourceInfo) -> SourceInfo:
         """Return the description of a source with the rate of its lines."""
