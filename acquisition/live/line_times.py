@@ -261,14 +261,12 @@ def _all_arrived(reads: Reads, at: F8) -> bool:
     """Return whether no line was lost: the earliest arrivals of all stretches then lie on one line over their count."""
     stretches = max(3, min(STRETCHES, at.size // 8))
     late, parts = at - at[-1] / reads.last[-1] * reads.last, np.array_split(np.arange(at.size), stretches)
-    earliest = np.array([rows[np.argmin(late[rows])] for rows in parts])
-    x = reads.last[earliest]
     for _ in range(3):  # the minima are those relative to the line
-        slope, start = np.polyfit(x, at[earliest], 1)
-        late = at - start - slope * reads.last
         earliest = np.array([rows[np.argmin(late[rows])] for rows in parts])
-        x = reads.last[earliest]
-    return bool(np.abs(late[earliest] - np.median(late[earliest])).max() < 0.35 * slope)
+        slope, start = np.polyfit(reads.last[earliest], at[earliest], 1)
+        late = at - start - slope * reads.last
+    minima = np.array([late[rows].min() for rows in parts])
+    return bool(np.abs(minima - np.median(minima)).max() < 0.35 * slope)
 
 
 def _with_losses(reads: Reads, at: F8, gaps: F8) -> tuple[I8, float]:
