@@ -117,7 +117,7 @@ def _changing(fitted: Oscillation) -> Notice:
 def _rest_drift(rest: RestPosition, u_rate: float) -> Notice:
     numbers = {"drift_m": rest.drift}
     if rest.mean.unit == "m" and rest.mean.value > 0.0:
-        share, seconds = rest.drift / rest.mean.value, float(np.ptp(rest.t))
+        share, seconds = rest.drift / rest.mean.value, float(np.ptp(rest.curve.domain))
         if share >= u_rate * seconds:
             numbers |= {"scale_change": share, "damping_rate_error": share / seconds}
     return Notice("rest_drift", numbers)

@@ -229,14 +229,15 @@ def fit_rest(windows: Windows, unit: str) -> RestPosition:
     t, offset = windows.t, windows.offset
     u = np.maximum(np.sqrt(windows.covariance[:, 2, 2]), 1e-15 * float(np.max(np.abs(offset))) + 1e-100)
     spread = scatter(t, offset, u)
-    polynomial, gain = smooth_curve(t, offset, spread)
+    curve, gain = smooth_curve(t, offset, spread)
     weight = 1.0 / spread.u[spread.kept]
     mean = float(np.average(offset[spread.kept], weights=weight**2))
     left = (offset[spread.kept] - mean) * weight
     widened = max(spread.correlation, correlation_length(left)) * max(1.0, float(left @ left) / max(left.size - 1, 1))
     estimate = Estimate(mean, math.sqrt(widened / float(weight @ weight)), unit)
-    curve = np.asarray(polynomial(t), np.float64)
-    return RestPosition(estimate, float(np.ptp(curve)), gain > VERY_STRONG, t, curve, spread)
+    half_s = 0.5 * np.diff(t[[0, -1]]) / max(t.size - 1, 1)
+    ends = np.concatenate([t[:1] - half_s, t[-1:] + half_s])
+    return RestPosition(estimate, curve.convert(domain=ends), float(np.ptp(curve(t))), gain > VERY_STRONG, spread)
 
 
 def typical_miss(fitted: Oscillation) -> float:

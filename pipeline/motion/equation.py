@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
+from numpy.polynomial import Legendre
 
 from pipeline.damping.law_fit import least_chi2, mean_squared_rate, weigh
 from pipeline.damping.laws.drag import COEFFICIENTS, DRAGS, Drag
@@ -40,7 +41,9 @@ STATE = ("rest", "displacement", "velocity", "angular_frequency")
 # Time step in radians: interpolation errs by 1e-7 of the amplitude, and splitting under weak drag by 1e-6, as measured
 # by `python -m benchmarks.dynamics`.
 STEP = 0.08
-REACH = 3.0  # maximum ratio, either way, of a frequency to its start value, and of a growing amplitude
+# Maximum ratio, either way, of a frequency to its start value, and of a growing amplitude: beyond it a search has left
+# the motion. With 10, nothing changes, as measured by `python -m tests.golden --every 3`.
+REACH = 3.0
 
 
 def envelope(y: float, v: float, omega: float, mu: float, gamma: float, beta: float) -> tuple[float, float, float]:
@@ -428,7 +431,7 @@ def _described(
     noises = np.full(windows.noises.shape, rms)
     windows = replace(windows, flags=flags, residual=residual, noises=noises)
     # The rest position is the constant one of the record; the place where friction holds the bob may differ.
-    rest = RestPosition(Estimate(still, float(u[0]), unit), 0.0, False, t, np.full(t.size, still))
+    rest = RestPosition(Estimate(still, float(u[0]), unit), Legendre([still]))
     waveform = Waveform(position, partial(np.asarray, model.motion.velocity(rows.t, theta)), residual, rms)
     return Oscillation(
         windows=windows,

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from numpy.polynomial import Legendre
 
 from pipeline.damping.law_fit import mean_squared_rate
 from pipeline.damping.select import Damping
@@ -73,15 +74,16 @@ class RestPosition:
     """The rest position: its mean, and a smooth curve through the windows that counts if it ``drifts``."""
 
     mean: Estimate
-    drift: float  # peak-to-peak range of the curve
-    drifts: bool  # whether the curve fits much better than a constant
-    t: F8  # (w,) centres of the windows, s
-    curve: F8  # (w,) m
+    curve: Legendre  # m, by the time in s; its domain is the part of the record that was fitted
+    drift: float = 0.0  # peak-to-peak range of the curve at the windows
+    drifts: bool = False  # whether the curve fits much better than a constant
     spread: Scatter | None = None  # of the windows' rest positions about a smooth curve
 
     def at(self, t: F8) -> F8:
         """Return the rest position in m at times t (n,)."""
-        return np.interp(t, self.t, self.curve) if self.drifts else np.full(t.size, self.mean.value)
+        if not self.drifts:
+            return np.full(t.size, self.mean.value)
+        return np.asarray(self.curve(np.clip(t, *self.curve.domain)))
 
 
 @dataclass(frozen=True, eq=False)

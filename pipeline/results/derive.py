@@ -39,7 +39,9 @@ from pipeline.results.formulas import solve
 from pipeline.track import F8, UNUSABLE, Quality, Track
 from pipeline.windows.demodulate import Windows
 
-U_AIR_TEMPERATURE_K = 0.5  # standard uncertainty of an air temperature stated without one, K
+# Standard uncertainty of an air temperature stated without one, K; the limit of error of a resistance thermometer of
+# class B is 0.4 K at 20 degrees (IEC 60751).
+U_AIR_TEMPERATURE_K = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +136,7 @@ def derive(
     of_scene = _of_scene(track, scene, {effect.name for effect in effects if effect.included}, inputs)
     every = solve(of_scene | _of_motion(track, fitted, misfits, laws, inputs))
     coefficients = every.get("coefficients", {})
-    found = {name: (x, _unit_of(name, unit)) for name, x in every.items() if name in QUANTITIES}
+    found = {name: (every[name], _unit_of(name, unit)) for name in QUANTITIES if name in every}
     parts = {
         name: Estimate.of_variable(every[name], _unit_of(name, unit)) if name in every else None for name in _PARTS
     }
@@ -168,7 +170,8 @@ def _closed(track: Track, motion: Relaxation | TwoModes | Rest, scene: Scene, in
     }
     of_motion, results = closed_form(motion, x, rate=rate, scale=scale)
     every = solve(of_scene | known | of_motion)
-    found = {name: value for name, value in every.items() if name in QUANTITIES} | results
+    every |= results
+    found = {name: every[name] for name in QUANTITIES if name in every}
     budgets = {name: inputs.budget(name, value, _unit_of(name, unit)) for name, value in found.items()}
     parts = {
         name: Estimate.of_variable(every[name], _unit_of(name, unit)) if name in every else None for name in _PARTS

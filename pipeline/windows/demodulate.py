@@ -16,7 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import AnalysisError
-from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_LINE, NOTICEABLE, OUTLIER, normal_quantile
+from pipeline.numerics.levels import (
+    FALSE_ALARM,
+    FEWEST_FOR_CURVE,
+    FEWEST_FOR_LINE,
+    NOTICEABLE,
+    OUTLIER,
+    VERY_STRONG,
+    normal_quantile,
+)
+from pipeline.numerics.regression import scatter, smooth_curve
 from pipeline.numerics.robust import mad_sigma, median
 from pipeline.samples.condition import Samples
 from pipeline.track import F8, U8, UNUSABLE, Quality
@@ -90,10 +99,19 @@ def demodulate(samples: Samples, cycles: Cycles) -> Windows:
     Weights of Cauchy's form, with a scale that shrinks from round to round, release the fit from them. Windows that
     disagree with their neighbours are fitted again from the neighbours' values. Then residuals beyond
     :data:`CLIP_SIGMAS` are excluded permanently. A second pass uses the decay :math:`g` of each window. Without it, the
-    conjugate line would bias the amplitude by the fraction :math:`g/2\\omega`.
+    conjugate line would bias the amplitude by the fraction :math:`g/2\\omega`. A rest position that moves or creeps is
+    part of the motion: how far it moves within the windows is subtracted, and they are fitted again.
     """
     windows = WindowSamples.sliced(samples, cycles.bounds)
     tuning = Tuning.constant(2.0 * math.pi * cycles.frequency_hz, len(windows.y))
+    fitted, solution, tuned = _passes(samples, windows, tuning)
+    if (moved := _moved(windows, solution, tuned)) is not None:
+        fitted, solution, tuned = _passes(samples, replace(windows, y=windows.y - moved, moved=moved), tuning)
+    return _finish(samples, cycles, fitted, solution, tuned)
+
+
+def _passes(samples: Samples, windows: WindowSamples, tuning: Tuning) -> tuple[WindowSamples, WindowFits, Tuning]:
+    """Fit every window in two passes; return also the windows without clipped crests, and the tuning."""
     basis = windows.basis(tuning.turning, tuning.decay)
     rough = retune(windows, solve(basis, windows.usable), tuning.angular_frequency, degree=1)
     basis = windows.decaying(basis, rough.decay)
@@ -103,7 +121,7 @@ def demodulate(samples: Samples, cycles: Cycles) -> Windows:
     weights = solution.weights
     if samples.clipped_from:
         level = _typical(_spread(windows.usable, solution.residual), windows, solution)
-        crest = samples.near_plateau(windows.y - solution.residual + windows.level, level)
+        crest = samples.near_plateau(windows.y - solution.residual + windows.moved + windows.level, level)
         windows = replace(windows, usable=np.where(crest, 0.0, windows.usable))
         weights = np.where(crest, 0.0, weights)
     # Fit again with each window's own frequency and decay.
@@ -111,7 +129,30 @@ def demodulate(samples: Samples, cycles: Cycles) -> Windows:
     basis = windows.basis(tuning.turning, tuning.decay)
     solution = solve(basis, weights)
     solution = _clip(windows, basis, solution, _spread(windows.usable, solution.residual), tuning)
-    return _finish(samples, cycles, windows, solution, tuning)
+    return windows, solution, tuning
+
+
+def _moved(windows: WindowSamples, fits: WindowFits, tuning: Tuning) -> F8 | None:
+    """Return how far a smooth rest position is from that at the window's centre, (w, l); None if it is no matter.
+
+    It must lower the BIC of the samples within the windows by more than :data:`VERY_STRONG`, and they must ask for it
+    times a factor of 0.5 to 1.5: rest positions that are wrong, as of windows that are no whole periods, make a curve
+    that the samples do not follow.
+    """
+    good, t = fits.good, windows.centre
+    if np.count_nonzero(good) < FEWEST_FOR_CURVE:
+        return None
+    squares, count = np.sum(fits.weights * fits.residual**2, axis=1)[good], fits.normal[good, 0, 0]
+    u = np.maximum(np.sqrt(squares) / np.maximum(count - 3.0, 1.0), windows.tiny)
+    offset = fits.coefficients[good, 0]
+    curve, _ = smooth_curve(t[good], offset, scatter(t[good], offset, u))
+    moved = np.asarray(curve.deriv()(np.clip(t, *curve.domain)))[:, None] * windows.tau
+    basis = windows.basis(tuning.turning, tuning.decay)
+    basis[:, 3] = moved
+    beyond = solve(basis, fits.weights).residual
+    size, along = (float(np.sum(fits.weights * beyond * x)) for x in (beyond, fits.residual))
+    strong = 2.0 * along - size > VERY_STRONG * float(squares.sum()) / float(count.sum())
+    return moved if strong and abs(along - size) < 0.5 * size else None
 
 
 def follow(windows: Windows, recorded: F8) -> Cycles:

@@ -44,6 +44,7 @@ class WindowSamples:
     level: float  # m, level subtracted from all distances to avoid cancellation in sums
     # m, length that is negligible beside the motion; it replaces zero in divisions by a spread or an amplitude.
     tiny: float
+    moved: F8 | float = 0.0  # (w, l) m, subtracted from y: the change of the rest position from the window's centre
 
     @classmethod
     def sliced(cls, samples: Samples, bounds: NDArray[np.int64]) -> WindowSamples:

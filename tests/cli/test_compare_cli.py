@@ -79,6 +79,7 @@ def test_a_report_is_written_where_it_is_wanted(tmp_path: Path, cli: Cli) -> Non
     assert 'id="figure-comparison' in page
 
 
+@pytest.mark.trials
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="no LaTeX; Debian: apt-get install texlive-science")
 def test_latex_compiles_the_lab_report_of_a_pair_and_its_tables(tmp_path: Path, cli: Cli) -> None:
     """No line is too wide, neither in the report nor in the text width of article; each cited figure is there."""

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 
 import numpy as np
@@ -15,9 +16,9 @@ from tests.trials.troubles.judge import LIMIT, try_one
 from tests.trials.troubles.record import Kind
 
 SEEDS = int(os.environ.get("SPRINGMASS_TROUBLES") or min(20, int(os.environ.get("SPRINGMASS_TRIALS", "2"))))
-NOISES = 40  # records whose noise is compared with the truth
-# Root mean square error of the noise in its u: 1, and 1.5 for four standard deviations of so many records.
-MOST_SPREAD = 1.5
+NOISES = min(40, 16 * SEEDS)  # records whose noise is compared with the truth
+# Root mean square error of the noise in its u: 1, and four standard deviations of so many records.
+MOST_SPREAD = 1.0 + 4.0 / math.sqrt(2.0 * NOISES)
 
 pytestmark = pytest.mark.trials
 
