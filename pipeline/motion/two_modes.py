@@ -10,13 +10,12 @@ import numpy as np
 from pipeline.motion.lines import WEAKER, Scaled
 from pipeline.notice import Refusal
 from pipeline.numerics.estimate import Estimate, Joint
-from pipeline.numerics.levels import NEGLIGIBLE
+from pipeline.numerics.levels import FEWEST_FOR_MEDIAN, NEGLIGIBLE
 from pipeline.samples.condition import Samples
 from pipeline.track import F8, U8
 
-# Minimum numbers of beats and of periods of the slower mode in the record; with fewer, two modes cannot be
-# distinguished from one that changes.
-BEATS, PERIODS = 0.8, 3.0  # those of tests/properties/test_no_oscillation.py at a ratio of 1.02 beat less than once
+# Minimum number of beats in the record; with fewer, two modes cannot be distinguished from one that changes:
+BEATS = 0.8  # those of tests/properties/test_no_oscillation.py at a ratio of 1.02 beat less than once
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,7 +56,8 @@ def find_two_modes(samples: Samples) -> TwoModes | Refusal:
     omegas, sizes = lines.omegas, lines.sizes
     beats = abs(omegas[0] - omegas[1]) * record.seconds / (2.0 * math.pi)
     slow, fast = float(np.min(omegas)), float(np.max(omegas))
-    if slow * record.seconds < 2.0 * math.pi * PERIODS or beats < BEATS or sizes[weak] < WEAKER * sizes[strong]:
+    few = slow * record.seconds < 2.0 * math.pi * FEWEST_FOR_MEDIAN or beats < BEATS
+    if few or sizes[weak] < WEAKER * sizes[strong]:
         return Refusal("no_two_modes")
     # A component at a multiple of the slower frequency is not a second mode but a harmonic, as of a square wave.
     if round(fast / slow) > 1 and abs(fast - round(fast / slow) * slow) * record.seconds < math.pi:

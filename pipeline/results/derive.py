@@ -39,7 +39,9 @@ from pipeline.results.formulas import solve
 from pipeline.track import F8, UNUSABLE, Quality, Track
 from pipeline.windows.demodulate import Windows
 
-U_AIR_TEMPERATURE_K = 0.5  # standard uncertainty of an air temperature stated without one, K
+# Standard uncertainty of an air temperature stated without one, K; the limit of error of a resistance thermometer of
+# class B is 0.4 K at 20 degrees (IEC 60751).
+U_AIR_TEMPERATURE_K = 0.5
 
 
 @dataclass(frozen=True, eq=False)
