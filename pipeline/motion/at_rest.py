@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.errors import AnalysisError
-from pipeline.motion.fitted import Closed
+from pipeline.motion.fitted import ClosedMotion
 from pipeline.notice import Refusal
 from pipeline.numerics.estimate import Joint
 from pipeline.numerics.regression import correlation_length
@@ -16,7 +16,7 @@ from pipeline.samples.condition import COARSE, Samples, coarsest_step
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rest(Closed):
+class Rest(ClosedMotion):
     """A bob at rest, or a recording whose motion is none that can be fitted."""
 
     why: Refusal

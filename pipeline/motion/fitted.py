@@ -152,7 +152,7 @@ class Oscillation:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Closed:
+class ClosedMotion:
     """A motion with few parameters and no laws."""
 
     joint: Joint  # its parameters, in the record's times and values

@@ -12,7 +12,7 @@ import numpy as np
 from pipeline.modes.mode import rotating
 from pipeline.modes.search import HIGHEST_MODE
 from pipeline.motion.fit import Rows, fit
-from pipeline.motion.fitted import Closed
+from pipeline.motion.fitted import ClosedMotion
 from pipeline.notice import Refusal
 from pipeline.numerics.estimate import Joint
 from pipeline.numerics.levels import (
@@ -229,7 +229,7 @@ def find_several(samples: Samples) -> DecayingLines | None:
     return None
 
 
-class TwoModes(Closed):
+class TwoModes(ClosedMotion):
     """Two oscillations, the stronger ("first") and the other one, neither of which is the main one.
 
     The parameters are the rest position, then the cosine and sine amplitudes at ``start_s``, angular frequency and

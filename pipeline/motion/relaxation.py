@@ -18,7 +18,7 @@ from typing import Literal
 import numpy as np
 
 from pipeline.motion.fit import Rows, allowed
-from pipeline.motion.fitted import Closed
+from pipeline.motion.fitted import ClosedMotion
 from pipeline.notice import Refusal
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate, Joint
@@ -195,7 +195,7 @@ DECAY_PARAMETERS = ("rest", "displacement", "velocity", "log_rate", "log_stiffne
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Relaxation(Closed):
+class Relaxation(ClosedMotion):
     """A motion that relaxes with two rates or with one, or an oscillation whose damping ratio is large."""
 
     kind: DampingKind  # the parameters are o, a, v, ln g and ln w
