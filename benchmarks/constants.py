@@ -2,8 +2,8 @@
 
 The count covers module-level assignments of numbers, including tuples and arrays of numbers, in acquisition, pipeline,
 storage and springmass. A table counts as one constant, ``A, B = 1, 2`` as two. A constant has a source if its comment
-names a publication, a probability, a standard or a measurement. ``--list`` prints the constants without a source. A
-ROOM such as pipeline/motion limits count and list to that folder.
+names a publication, a formula, a probability, a standard or a measurement, or says that it is chosen. ``--list`` prints
+the constants without a source. A ROOM such as pipeline/motion limits count and list to that folder.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ PACKAGES = ("acquisition", "pipeline", "storage", "springmass")
 SOURCE = re.compile(
     r"doi|arxiv|https?:|\bet al|\[\d+\]_|data ?sheet|\bNIST\b|\bISO\b|\bIEEE\b|\bRFC ?\d|CODATA|\(\d{4}\)|"
     r"probab|\bchance|false.alarm|in a (hundred|thousand|million)|share of (plain )?records|"
-    r"measured|python -m|pytest|benchmarks/|tests/",
+    r"measured|python -m|pytest|benchmarks/|tests/|\bformula|follows? from|by definition|\bIEC\b|is chosen",
     re.IGNORECASE,
 )
 

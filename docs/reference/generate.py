@@ -1,26 +1,34 @@
-"""Write the tables of command-line.md and estimates.md, and findings.md, from the declarations in the program.
+"""Write tables of command-line.md and estimates.md, findings.md and results.schema.json from the program.
 
 ``python docs/reference/generate.py`` brings the pages up to date; ``tests/docs/test_docs.py`` checks that they are.
 """
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+import msgspec
 from cyclopts import Group
 from cyclopts.argument import Argument
 
 from pipeline.findings.finding import RANK, FindingKind, kinds, usual_advice
+from pipeline.numerics.estimate import Estimate
 from pipeline.quantities import QUANTITIES
 from pipeline.results.formulas import FORMULAS
 from springmass.commands import COMMANDS, app
 from springmass.commands.options import HOW_READ, THE_PAGE
+from springmass.comparing.comparison import ComparisonResult
+from springmass.result.run_json import RESULT_SCHEMA, NumberWithU, RunResult
 
 PAGE = Path(__file__).with_name("command-line.md")
 FINDINGS_PAGE = Path(__file__).with_name("findings.md")
 ESTIMATES_PAGE = Path(__file__).with_name("estimates.md")
+JSON_PAGE = Path(__file__).with_name("json.md")
+SCHEMA = Path(__file__).with_name("results.schema.json")
 SHOWN = {"error": "error", "warning": "warning", "info": "note"}
 TABLE = re.compile(r"<!-- options of (?P<what>[\w ]+) -->\n.*?<!-- end -->\n", re.DOTALL)
 LIST = re.compile(r"<!-- commands -->\n.*?<!-- end -->\n", re.DOTALL)
@@ -198,8 +206,71 @@ def findings_page() -> str:
     return "\n".join([*parts, GONE])
 
 
+def results_schema(page: str) -> dict[str, Any]:
+    """Return the JSON Schema of results from the types that write them, with the meanings that the page gives them."""
+    types = [RunResult, ComparisonResult, NumberWithU]
+    (run, comparison, _), definitions = msgspec.json.schema_components(
+        types, schema_hook={Estimate: {"$ref": "#/$defs/NumberWithU"}}.__getitem__, ref_template="#/$defs/{name}"
+    )
+    for definition in definitions.values():
+        if any("default" in each for each in definition["properties"].values()):  # a dataclass: all of it is written
+            definition["required"] = list(definition["properties"])
+    definitions = _without_infinity(definitions)
+    found = set()
+    for part, root in zip(page.split("## Of a comparison"), (run, comparison), strict=True):
+        for fields, meaning in re.findall(r"^\| (`[^|]*`) \| [^|]* \| ([^|]+) \|$", part, re.MULTILINE):
+            for field in re.findall("`(.*?)`", fields):
+                name, node = _described(field, root, definitions)
+                if name:
+                    node.setdefault("description", re.sub(r"`|\[|\]\([^)]*\)|\]", "", meaning))
+                    found.add(name)
+    if missing := {f"{of}.{name}" for of, each in definitions.items() for name in each["properties"]} - found:
+        raise SystemExit(f"json.md: no row describes {', '.join(sorted(missing))}; add one")
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": f"Results of springmass as JSON, schema {RESULT_SCHEMA}",
+        "anyOf": [run, comparison, {"type": "array", "items": run}],
+        "$defs": definitions,
+    }
+
+
+def _without_infinity(node: Any) -> Any:
+    """Return a schema in which a number may be null, because JSON has no infinity; and without defaults."""
+    if isinstance(node, list):
+        return [_without_infinity(each) for each in node]
+    if not isinstance(node, dict):
+        return node
+    if node.get("type") == "number" or {"type": "number"} in node.get("anyOf", ()):
+        return {"type": ["number", "null"]}
+    return {key: _without_infinity(value) for key, value in node.items() if key != "default"}
+
+
+def _described(field: str, node: dict[str, Any], definitions: dict[str, Any]) -> tuple[str, dict[str, Any]]:
+    """Return the name, as ``TYPE.FIELD``, and the schema of a field such as ``budget.NAME.inputs[].name``.
+
+    The name is empty if it is a key of a mapping, such as that of an estimate.
+    """
+    path = ""
+    for token in field.replace("[]", ".[]").split("."):
+        node = next((each for each in node.get("anyOf", ()) if each != {"type": "null"}), node)
+        of = node.get("$ref", "").removeprefix("#/$defs/")
+        node = definitions.get(of, node)
+        path = ""
+        if token == "[]":
+            node = node["items"]
+        elif token in node.get("properties", {}):
+            path, node = f"{of}.{token}", node["properties"][token]
+        elif "additionalProperties" in node:
+            node = node["additionalProperties"]
+        else:
+            raise SystemExit(f"json.md: no field {field} is written; remove its row")
+    return path, node
+
+
 if __name__ == "__main__":
     PAGE.write_text(updated(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
     FINDINGS_PAGE.write_text(findings_page(), encoding="utf-8")
     ESTIMATES_PAGE.write_text(estimates_page(ESTIMATES_PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    schema = results_schema(JSON_PAGE.read_text(encoding="utf-8"))
+    SCHEMA.write_text(json.dumps(schema, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     print(f"{len(COMMANDS)} commands, {len(kinds())} finding codes")

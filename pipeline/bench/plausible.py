@@ -23,10 +23,15 @@ USUAL: dict[str, tuple[float, float]] = {
     "start_velocity_m_per_s": (-10.0, 10.0),
 }
 """Ranges of a bench: the air pressures at which people live, and the distances and speeds of a hall."""
-AIR_SHARE = 0.5  # of the bob's mass that may swing along as air; a disc of 30 cm on 0.1 kg has 11 %
-SPRING_BOBS = 5.0  # bobs that a spring may weigh
-LONGEST_SAG_M = 10.0  # the longest range of a rangefinder (MaxBotix XL-MaxSonar)
-DECIDING = 20.0  # ratio of two readings above which a slip would decide the results; an inch is 2.5 cm
+# Share of the bob's mass that may swing along as air: by the formula of Lamb (1932) it is 11 % for a disc of 30 cm on a
+# bob of 0.1 kg.
+AIR_SHARE = 0.5
+# Bobs that a spring may weigh. It is chosen: ten times the heaviest laboratory spring, 50 g, on a bob of 0.1 kg.
+SPRING_BOBS = 5.0
+LONGEST_SAG_M = 10.0  # the longest range of a rangefinder (data sheet of the MaxBotix XL-MaxSonar)
+# Ratio of two readings above which a slip would decide the results: by definition an inch is 2.54 cm, and other units
+# of a bench differ by 100 and more.
+DECIDING = 20.0
 
 
 class Slip(NamedTuple):

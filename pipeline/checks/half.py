@@ -7,14 +7,15 @@ import math
 import numpy as np
 
 from pipeline.checks.residual import PARTS, Outcome, Residual
+from pipeline.checks.shape import HIGHEST
 from pipeline.numerics.levels import IMPROBABLE, NEGLIGIBLE, SIGNIFICANT
 from pipeline.track import F8
 
-# Harmonics of the motion that make pulses, with the line at twice its frequency.
+# Harmonics of the motion that make pulses, with the line at twice its frequency; by chance each has the probability of
+# :data:`IMPROBABLE`.
 PULSES = 3
-HIGHEST_MULTIPLE = 8  # order of the harmonics of the motion that are sought
 # How far the mean moves over the amplitude of the line at twice the frequency, and the harmonic of that line over
-# it. A radial acceleration is g (1 + A^2/4 - 3/4 A^2 cos 2 phi), a height
+# it, which follow from three formulas. A radial acceleration is g (1 + A^2/4 - 3/4 A^2 cos 2 phi), a height
 # l A^2/4 (1 + cos 2 phi), the magnitude of a sine
 # 2/pi + 4/(3 pi) cos 2 phi - 4/(15 pi) cos 4 phi + ...
 RADIAL, HEIGHT, MAGNITUDE, CUSPS = 1.0 / 3.0, 1.0, 1.5, -0.2
@@ -34,7 +35,7 @@ def half_frequency(residual: Residual) -> Outcome | None:
     values = residual.values + residual.fitted.modes.independent(residual.samples.track.t[residual.rows])
     found: dict[str, float | None] = {}
     if _locked(residual, values, 1):
-        sizes = [abs(_locked(residual, values, order)) for order in range(3, HIGHEST_MULTIPLE + 1)]
+        sizes = [abs(_locked(residual, values, order)) for order in range(3, HIGHEST + 1)]
         pulses = 1 + np.count_nonzero(sizes)
         if any(abs(abs(moves) - x) < NEGLIGIBLE * x + SIGNIFICANT * u_moves < x for x in (RADIAL, HEIGHT)):
             found["moves"] = moves

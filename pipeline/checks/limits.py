@@ -37,7 +37,8 @@ def _no_distance(numbers: Mapping[str, float]) -> Misfit:
     return Misfit(name="implausible_distance", offset=max(numbers["amplitude_m"], numbers["rest_m"]))
 
 
-# Below two samples per period the frequency is aliased, and below four noise decides; uneven times have no aliases.
+# Below two samples per period the frequency is aliased by the sampling theorem, and below four, which is chosen, noise
+# decides; uneven times have no aliases.
 ENOUGH = 4.0
 LIMITS = (
     Limit("undersampled", "samples_per_period", ("samples_per_period",), least=ENOUGH, of_spring=False),

@@ -13,7 +13,7 @@ from pipeline.samples.condition import COARSE
 from pipeline.track import F8
 from pipeline.windows.demodulate import FINEST
 
-# Degree of the polynomials of a slow change: a smooth curve through a run has four parameters and one more.
+# Degree of the polynomials of a slow change: it follows from the four parameters of a smooth curve through a run.
 SLOW = 4
 ALARM_OF_A_TEST = FALSE_ALARM / 2.0  # probability of a false alarm of each of the two tests that decide by one alone
 

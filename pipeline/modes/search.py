@@ -33,8 +33,11 @@ CHANCE = 0.005  # probability that a mode is found in a record without any; as m
 # as measured by `python -m tests.golden --only damped`.
 ENVELOPE = 4
 # Minimum number of windows; fewer cannot separate a mode from the main oscillation. With 5, edges of a clipped signal
-# count as modes, as measured by `python -m tests.golden --only n0.csv`.
+# count as modes (`python -m tests.golden --only n0.csv`), and with 8, one of eight periods goes (`--only Q1.txt`).
 LEAST_WINDOWS = 6
+# Ratio to the main frequency below which modes are sought, and from which a line is an overtone. With 2.5, harmonics of
+# clipped signals and triangles are overtones, as measured by `python -m tests.golden --every 3`.
+HIGHEST_MODE = 3.4
 # Maximum length of a record, periods: a search in 18,000 of them takes 330 MB and 1.3 s, as measured.
 LONGEST_SEARCH = 4096
 
@@ -71,7 +74,9 @@ def find_modes(samples: Samples, windows: Windows) -> Modes:
 def _band(carrier: Carrier, blocks: Blocks) -> SearchBand:
     main, bin_hz = carrier.angular_frequency / (2.0 * math.pi), 1.0 / blocks.seconds
     low = max((0.5 * carrier.rest_degree + 2.0) * bin_hz, 0.1 * main)
-    return SearchBand(low, min(3.4 * main, 0.4 / blocks.step), ((main, (0.5 * carrier.degree + 2.0) * bin_hz),))
+    return SearchBand(
+        low, min(HIGHEST_MODE * main, 0.4 / blocks.step), ((main, (0.5 * carrier.degree + 2.0) * bin_hz),)
+    )
 
 
 class _Search:

@@ -25,7 +25,10 @@ from pipeline.samples.condition import Samples
 from pipeline.track import F8, UNUSABLE, Bools, Quality
 from pipeline.windows.demodulate import Windows, model_error, with_prior
 
-FEW_WINDOWS = 4  # minimum number of windows whose amplitudes can select a law; with fewer the samples do
+# Minimum number of windows whose amplitudes can select a law; with fewer the samples do. A law of two
+# coefficients has three parameters, so that fewer leave no degree of freedom. With 5, one of 234 recordings changes, as
+# measured by `python -m tests.golden --every 3`.
+FEW_WINDOWS = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -27,8 +27,8 @@ from pipeline.windows.demodulate import CLIP_SIGMAS
 FEW_CHANGES = 1e-4
 
 
-# Maximum ratio of the noise to that of the fourth differences of neighbours: for a mean of k samples it is
-# sqrt(7 k / 4), as follows from their coefficients; here k is 8.
+# Maximum ratio of the noise to that of the fourth differences of neighbours: for a mean of k samples the formula
+# sqrt(7 k / 4) follows from their coefficients; here k is 8.
 SMOOTHED = math.sqrt(14.0)
 
 

@@ -10,7 +10,11 @@ from typing import Literal
 import numpy as np
 
 from pipeline.modes.mode import rotating
+from pipeline.modes.search import HIGHEST_MODE
 from pipeline.motion.fit import Rows, fit
+from pipeline.motion.fitted import ClosedMotion
+from pipeline.notice import Refusal
+from pipeline.numerics.estimate import Joint
 from pipeline.numerics.levels import (
     FEWEST_FOR_CURVE,
     FEWEST_FOR_MEDIAN,
@@ -22,21 +26,21 @@ from pipeline.numerics.levels import (
 )
 from pipeline.numerics.regression import beyond, correlation_length
 from pipeline.numerics.robust import median
-from pipeline.samples.condition import Samples
+from pipeline.samples.condition import ONE_VALUE, Samples
 from pipeline.track import F8, Bools
 from pipeline.units import amount
 
-MOTIONLESS = 64.0 * float(np.finfo(np.float64).eps)  # relative scatter of a motionless record by IEEE rounding
-# Minimum ratio of a line's amplitude to the strongest one's; below it only one oscillation counts.
-WEAKER = 1.0 / 3.0
+# Share of the strongest line's amplitude from which another one counts; a weaker one has a negligible power.
+WEAKER = math.sqrt(NEGLIGIBLE)
 MOST = 100_000  # maximum number of median spacings, whose fit takes 0.3 s as measured; longer records are not fitted
 # Frequencies of the mains and their doubles, Hz, and how far they stray: EN 50160 allows 1 % in 99.5 % of a year.
 MAINS_HZ, MAINS_SHARE = (50.0, 60.0, 100.0, 120.0), 0.01
-# Ratio to the main frequency from which a line is an overtone; the modes in windows are sought below it.
-OVERTONE = 3.4
-APART = 1.0  # least distance of two lines in reciprocals of the length of the record, as those of a beat
-SIDEBANDS = 3.0  # distance in the same unit within which a decay or a change of the frequency has sidebands
-
+# Distance in bins, the reciprocals of the length of the record, within which a decay or a change of the frequency has
+# sidebands, as measured on the wide pendulum and the lost rows of `python -m tests.trials.grades kinds`.
+SIDEBANDS = 3.0
+# Minimum number of beats in the record; with fewer, two modes cannot be distinguished from one that changes:
+BEATS = 0.8  # those of tests/properties/test_no_oscillation.py at a ratio of 1.02 beat less than once
+MODE_PARAMETERS = ("rest", *(f"{m}_{n}" for m in ("first", "second") for n in ("cosine", "sine", "omega", "decay")))
 
 Cause = Literal["drive", "mains", "overtone"]
 """What keeps up a line that is not the free oscillation's, or that it is an overtone."""
@@ -77,7 +81,7 @@ class Scaled:
         scale = float(np.std(y))
         if (
             y.size < 4 * FEWEST_FOR_CURVE
-            or scale <= MOTIONLESS * float(np.max(np.abs(y)))
+            or scale <= ONE_VALUE * float(np.max(np.abs(y)))
             or not 0.0 < t[-1] - t[0] < MOST * float(np.median(np.diff(t)))
         ):
             return None
@@ -225,6 +229,58 @@ def find_several(samples: Samples) -> DecayingLines | None:
     return None
 
 
+class TwoModes(ClosedMotion):
+    """Two oscillations, the stronger ("first") and the other one, neither of which is the main one.
+
+    The parameters are the rest position, then the cosine and sine amplitudes at ``start_s``, angular frequency and
+    decay rate of each mode.
+    """
+
+
+def find_two_modes(samples: Samples) -> TwoModes | Refusal:
+    """Return the two modes that a record consists of, or refuse them if they do not describe it.
+
+    :math:`o + \\sum_i e^{-g_i t}(a_i\\cos\\omega_i t + b_i\\sin\\omega_i t)` is fitted to all samples used, started
+    from the strongest line of the spectrum and the strongest line of the residual of the first. Covariances are scaled
+    by the residuals, including their correlation.
+    """
+    if (record := Scaled.of(samples)) is None:
+        return Refusal("no_two_modes")
+    first = record.strongest(record.values)
+    second = record.strongest(record.less(record.linear((first, 0.0))))
+    lines = record.fitted(record.linear((first, 0.0), (second, 0.0)))
+    if lines is None or not lines.left < NEGLIGIBLE:
+        return Refusal("no_two_modes")
+    strong, weak = np.argsort(-lines.sizes).tolist()
+    omegas, sizes = lines.omegas, lines.sizes
+    beats = abs(omegas[0] - omegas[1]) * record.seconds / (2.0 * math.pi)
+    slow, fast = float(np.min(omegas)), float(np.max(omegas))
+    few = slow * record.seconds < 2.0 * math.pi * FEWEST_FOR_MEDIAN or beats < BEATS
+    if few or sizes[weak] < WEAKER * sizes[strong]:
+        return Refusal("no_two_modes")
+    # A component at a multiple of the slower frequency is not a second mode but a harmonic, as of a square wave.
+    if round(fast / slow) > 1 and abs(fast - round(fast / slow) * slow) * record.seconds < math.pi:
+        return Refusal("no_two_modes")
+    order = [0, *(k for i in (strong, weak) for k in range(1 + 4 * i, 5 + 4 * i))]
+    # Back to the unit of the record; the rest position was measured from the mean.
+    scale, unit = record.scale, samples.track.unit
+    turn = np.array([scale, *(2 * (scale, scale, 1.0, 1.0))])
+    level = np.array([record.level, *(8 * (0.0,))])
+    units = (unit, *(2 * (unit, unit, "rad/s", "1/s")))
+    covariance = lines.covariance[np.ix_(order, order)] * np.outer(turn, turn)
+    joint = Joint(MODE_PARAMETERS, lines.values[order] * turn + level, covariance, units)
+    residual = np.full(len(samples.track), np.nan)
+    residual[record.used] = scale * lines.residual
+    return TwoModes(
+        joint=joint,
+        dof=lines.dof,
+        noise=samples.noise_estimate,
+        start_s=record.start_s,
+        residual=residual,
+        flags=samples.flags,
+    )
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Apart:
     """A line that is not the free oscillation's, and that is subtracted before the analysis."""
@@ -293,9 +349,9 @@ def _others(record: Scaled, first: float, omega: F8, power: F8) -> Iterator[floa
     # Times the time too, because what falls is no exponential alone.
     columns = np.stack([np.ones(wave.size), *(x for each in (wave, record.tau * wave) for x in (each.real, each.imag))])
     left = record.spectrum(beyond(np.linalg.qr(columns.T)[0], record.values), 2)[1]
-    room = APART * math.tau / record.seconds
+    room = math.tau / record.seconds
     beside = np.abs(omega - first * np.round(omega / first))
-    far = (omega > OVERTONE * first) & (beside > room + NOTICEABLE * omega)
+    far = (omega > HIGHEST_MODE * first) & (beside > room + NOTICEABLE * omega)
     for powers, among in ((left, left > 0.0), (power, far)):
         if np.count_nonzero(among) <= FEWEST_FOR_CURVE:
             continue
@@ -310,7 +366,7 @@ def _cause(lines: DecayingLines, number: int) -> Cause | None:
     other, sizes, omegas, rates = 1 - number, lines.sizes, lines.omegas, lines.rates
     mains = any(abs(float(omegas[number]) / math.tau - each) < MAINS_SHARE * each for each in MAINS_HZ)
     u_rates = np.sqrt(np.diag(lines.covariance)[4::4])
-    if abs(omegas[0] - omegas[1]) * lines.record.seconds < APART * math.tau:
+    if abs(omegas[0] - omegas[1]) * lines.record.seconds < math.tau:
         return None  # the fit of a single one that does not fall as an exponential
     # The other one must last for a few periods, or it is no oscillation but a disturbance at the start.
     if rates[other] > omegas[other] / (math.tau * FEWEST_FOR_MEDIAN):
@@ -322,7 +378,7 @@ def _cause(lines: DecayingLines, number: int) -> Cause | None:
     falls = rates[other] > max(OUTLIER * u_rates[other], math.log(2.0) / lines.record.seconds)
     if falls and float(weights @ lines.values) < -2.0 * u and (mains or (number == 0 and sizes[1] > WEAKER * sizes[0])):
         return "mains" if mains else "drive"
-    if number == 0 or omegas[1] < OVERTONE * omegas[0] or sizes[1] < NEGLIGIBLE * sizes[0]:
+    if number == 0 or omegas[1] < HIGHEST_MODE * omegas[0] or sizes[1] < NEGLIGIBLE * sizes[0]:
         return None
     if omegas[0] * lines.record.seconds < FEWEST_FOR_CURVE * math.tau:
         return None  # a slow line of few periods may be a rest position that moves

@@ -9,15 +9,15 @@ import numpy as np
 
 from pipeline.motion.fitted import Oscillation, delay
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.levels import FEWEST_FOR_CURVE, NEGLIGIBLE, VERY_STRONG
+from pipeline.numerics.levels import FEWEST_FOR_CURVE, NEGLIGIBLE, ROUNDS, VERY_STRONG
 from pipeline.numerics.regression import scatter, solve_weighted
 from pipeline.track import F8
 from pipeline.windows.demodulate import ROUNDING, Windows
 
-LARGEST_ANGLE = 2.8  # rad, largest angle of the table
-ANGLES = 281  # of the table; between them the frequency is interpolated to 1e-5 up to 2 rad
-QUARTER_POINTS = 64  # of a quarter of a swing, exact for harmonics up to the 127th
-REFINEMENTS = 3  # for the frequency at rest, on which the amplitude of an angular velocity depends
+# Largest angle of the table, rad, where a swing takes twice as long as a small one, and its numbers of angles and of
+# points in a quarter of a swing. The frequency differs by at most 1.7e-6 from that of 2801 angles and 256 points, as
+# measured.
+LARGEST_ANGLE, ANGLES, QUARTER_POINTS = 2.8, 281, 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,7 +78,8 @@ def _at_rest(windows: Windows, total: F8, table: SwingTable, length_m: float, un
     size, omega = np.abs(windows.amplitude) / length_m, windows.angular_frequency
     noise = np.maximum(np.sqrt(windows.covariance[:, 1, 1]), ROUNDING)
     square = cumulative_trapezoid(size**2, windows.t, initial=0.0)
-    for _ in range(REFINEMENTS if unit == "rad/s" else 1):
+    # The amplitude of an angular velocity depends on the frequency at rest.
+    for _ in range(ROUNDS if unit == "rad/s" else 1):
         if unit == "rad/s":
             # The recorded amplitude is that of the angle times the frequency, which falls with it.
             trial = table.recorded * table.frequency * omega

@@ -11,7 +11,7 @@ from pipeline.numerics.regression import beyond, decompose
 from pipeline.track import F8
 
 # Share of the information on a combination of parameters below which the other half does not determine it. It is above
-# the error of numerical derivatives in double precision, 4e-11 to 1e-7 (:mod:`pipeline.numerics.least_squares`).
+# the error of numerical derivatives in double precision, 4e-11 to 1e-7 (Press et al. (2007), section 5.7).
 UNDETERMINED = 1e-6
 
 

@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_MEDIAN, OUTLIER, ROUNDS, normal_quantile
+from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_MEDIAN, LIMIT, OUTLIER, ROUNDS, normal_quantile
 from pipeline.numerics.robust import mad_sigma
 from pipeline.samples.condition import Clipping, Samples
 from pipeline.track import F8, Bools, Quality
@@ -22,8 +22,6 @@ from pipeline.windows.sinusoids import WindowSamples, refit, solve
 # Number of heights tried for the level, from the middle of the swing to its top. With 80, amplitudes of clipped records
 # move by up to 0.05 u, as measured by `python -m tests.trials.troubles --only clipped`.
 HEIGHTS = 40
-# Probability that a sample of a plateau lies below the level beyond which samples are left out.
-SHARE_BEYOND = 0.05
 
 # Fraction of the amplitude within which the motion is never clipped, so that the sinusoid can be fitted: a sample lies
 # there with a probability of 1/3.
@@ -173,7 +171,7 @@ def _end(fit: _Fit, sign: float, sigma: float) -> _End | None:
     if best == 0 or left[best] > np.sum(np.abs(bent)):
         return None
     plateau = (height - short)[height > levels[best]]
-    return _End(sign, min(float(levels[best]), float(np.quantile(plateau, SHARE_BEYOND))), n)
+    return _End(sign, min(float(levels[best]), float(np.quantile(plateau, 1.0 - LIMIT))), n)
 
 
 def _beyond(fit: _Fit, ends: list[_End]) -> Bools:

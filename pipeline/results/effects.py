@@ -27,7 +27,7 @@ from pipeline.numerics.levels import NEGLIGIBLE
 from pipeline.track import Track
 from pipeline.units import amount
 
-SPEED_OF_SOUND_OF_RECORD = 344.0  # m/s, fixed in MotionSensor.vi
+SPEED_OF_SOUND_OF_RECORD = 344.0  # m/s, by definition of MotionSensor.vi, which wrote the recordings
 STEEL_KG_PER_M3 = 7850.0  # EN 1993-1-2 (2005), 3.2.2
 # Relative decrease of the modulus of rigidity of steel with temperature, 1/K: G. H. Keulegan, M. R. Houseman, J. Res.
 # NBS 10 (1933) 289.

@@ -11,18 +11,19 @@ import numpy as np
 
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.levels import FEWEST_FOR_MEDIAN, NEGLIGIBLE, OUTLIER, coverage_factor
+from pipeline.numerics.levels import FEWEST_FOR_LINE, FEWEST_FOR_MEDIAN, NEGLIGIBLE, OUTLIER, coverage_factor
 from pipeline.numerics.robust import mad_sigma
 from pipeline.several.compare import NEARER, Comparison, SpringRun, compare_springs
 
 # Maximum number of runs compared as those of one bench, which takes 0.3 s as measured if they disagree; of a larger
 # group only far runs are named.
 LARGEST_BENCH = 50
-LITTLE = 0.005  # relative spread of one bench's constants up to which no run is blamed: springs are not ideal
+# Relative spread of one bench's constants up to which no run is blamed: twice the quarter of a percent by which, as
+# measured below, its own runs differ.
+LITTLE = 0.005
 # Relative difference of a run from the others from which an exchange is looked for: bobs more alike than this cannot be
-# distinguished on springs that differ by the quarter of a percent that one bench's own runs do.
+# distinguished on springs that differ, as measured, by the quarter of a percent that one bench's own runs do.
 LEAST_EXCHANGE = 0.003
-MOST_OTHERS = FEWEST_FOR_MEDIAN + 1  # runs of a bench with which an exchanged one is compared
 EXCHANGES = ("recordings", "masses")
 
 
@@ -232,7 +233,7 @@ class _Displaced:
 
     def tension(self, spring: SpringRun) -> float:
         """Return the tension after an exchange; infinite if this run then neither agrees nor comes far nearer."""
-        others = self.others[:MOST_OTHERS]
+        others = self.others[:FEWEST_FOR_LINE]
         before, after = (_compared([replace(self.run, on_spring=x), *others]) for x in (self.spring, spring))
         limit = 1.0 if before is None else max(NEARER * before.tension, 1.0)
         return math.inf if after is None or after.tension > limit else after.tension

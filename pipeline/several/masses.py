@@ -91,9 +91,6 @@ class Hooke:
         return abs(self.constant.value - other.value) / expanded
 
 
-FEWEST_BENT = 6  # points that two lines with a common corner need, for two degrees of freedom
-
-
 def hooke(load: F8, position_m: F8, unit: str = "kg") -> Hooke:
     """Fit a line to rest positions; its u comes from their scatter, and for masses from that of g, 9.81(2) m/s^2.
 
@@ -141,7 +138,7 @@ def _straight(load: F8, position_m: F8) -> tuple[NDArray[np.bool_], str]:
 
     every, free = np.ones(load.size, np.bool_), load.size - 4
     corners = np.unique(load)[2:-2]
-    if load.size < FEWEST_BENT or not corners.size:
+    if not corners.size:
         return every, ""
 
     def left(corner: float | None) -> float:

@@ -21,8 +21,6 @@ from pipeline.dynamics.strang import EXACT, STRANG
 from pipeline.errors import DynamicsError
 from pipeline.simulation.methods import LEAST_RTOL, SolveIvp
 
-LONGEST_STEP = 0.5  # maximum first step in rad; with fewer than six steps per cycle halving cannot estimate the error
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
@@ -178,7 +176,7 @@ def _settings(
         return
     # Drag stronger than the spring has its own, shorter time scale, which the step must resolve.
     fast = omega * (1.0 + problem.equation.drag_per_m * problem.amplitude_m())
-    longest = min(LONGEST_STEP / fast, integrator.stable_step(problem) or math.inf)
+    longest = min(1.0 / fast, integrator.stable_step(problem) or math.inf)
     parts = math.floor(min(spacing_s / longest, MOST_STEPS)) + 1
     while parts * count <= MOST_STEPS:
         yield integrator, parts

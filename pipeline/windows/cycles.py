@@ -24,7 +24,7 @@ SAMPLES_PER_WINDOW = 12
 # The probability that two of them differ by half a turn is 1e-28.
 U_PHASE = 0.2
 # Highest frequency that is sought at uneven times, over their mean rate; a search up to it takes as long as an FFT of
-# sixteen times as many values.
+# sixteen times as many values. With 8, nothing changes, as measured by `python -m tests.golden --every 3`.
 BEYOND = 4.0
 # Maximum number of windows; longer records have longer windows, not more of them. An analysis of 10,000 windows takes
 # 0.6 s, measured on 260,000 samples.

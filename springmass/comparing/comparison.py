@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, NotRequired, TypedDict
 
 from pipeline.analyse import Oscillation
 from pipeline.bench.scene import Scene
@@ -22,11 +22,99 @@ from springmass.comparing.reported import Reported, judge, read_reported
 from springmass.comparing.user_table import read_hooke
 from springmass.errors import ProgramError
 from springmass.result.frames import comparison_frame
-from springmass.result.run_json import RESULT_SCHEMA, parameters_json, picked, plain
+from springmass.result.run_json import (
+    RESULT_SCHEMA,
+    Parameter,
+    Provenance,
+    RunResult,
+    fields_of,
+    parameters_json,
+    plain,
+)
 from springmass.runs.run import Run
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+class OfRun(TypedDict):
+    """One run of a comparison."""
+
+    name: str
+    period: Estimate
+    mass: Estimate
+    spring_constant: Estimate
+    u_own: float
+    pull: float
+
+
+class Springs(TypedDict):
+    """The comparison of the spring constants."""
+
+    agree: bool
+    spring_constant: Estimate | None
+    spring_mass: Estimate | None
+    spring_mass_stated: bool
+    chi2: float
+    dof: int
+    largest_deviation: float
+    exchanged: Sequence[str]
+    exchanged_chi2: float | None
+    message: str
+    each: Sequence[OfRun]
+
+
+class JointLaw(TypedDict):
+    """The fit of one law with common coefficients."""
+
+    parameters: Mapping[str, Parameter]
+    reduced_chi2: float
+    dof: float
+    bic: float
+    excess_chi2: float
+    excess_dof: float
+    rejection: str
+
+
+class JointLaws(TypedDict):
+    """The fits of the laws to the runs of one bob and disc."""
+
+    runs: Sequence[str]
+    one_law: bool
+    selected: str
+    admissible: Sequence[str]
+    message: str
+    laws: Mapping[str, JointLaw]
+
+
+class LineOfMasses(TypedDict):
+    """The line through the squared periods of several masses."""
+
+    constant: Estimate
+    effective_mass: Estimate
+    chi2: float
+    dof: int
+
+
+class HookesLaw(TypedDict):
+    """The spring constant by Hooke's law."""
+
+    constant: Estimate
+    normalised_error: float | None
+
+
+class ComparisonResult(TypedDict):
+    """The result of a comparison."""
+
+    schema: Literal[3]
+    comparison: Springs
+    joint_damping: Sequence[JointLaws]
+    findings: Sequence[Finding]
+    mass_line: NotRequired[LineOfMasses]
+    hooke: NotRequired[HookesLaw]
+    reported: NotRequired[Sequence[Reported]]
+    runs: Sequence[RunResult]
+    provenance: Provenance
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -175,22 +263,21 @@ def comparison_words(compared: SpringComparison) -> list[str]:
     return lines
 
 
-def comparison_json(compared: SpringComparison, provenance: Mapping[str, Any]) -> dict[str, Any]:
+def comparison_json(compared: SpringComparison, provenance: Provenance) -> dict[str, Any]:
     """Return a comparison as a JSON-serialisable mapping; numbers that are not finite become None."""
     runs = compared.runs.values()
     springs = compared.comparison
     derived = [run.analysis.derived for run in runs]
     each = zip(springs.names, derived, springs.each, springs.own_u, springs.pulls, strict=True)
-    numbers = ("chi2", "dof", "largest_deviation", "exchanged", "exchanged_chi2", "message")
-    content: dict[str, Any] = {
+    results: Any = [run.result for run in runs]
+    content: ComparisonResult = {
         "schema": RESULT_SCHEMA,
-        "comparison": {
-            "agree": springs.agree,
-            "spring_constant": springs.spring_constant if springs.agree else None,
-            "spring_mass": springs.spring_mass if springs.agree else None,
-            "spring_mass_stated": springs.spring_mass_stated,
-            **picked(springs, numbers),
-            "each": [
+        "comparison": fields_of(
+            Springs,
+            springs,
+            spring_constant=springs.spring_constant if springs.agree else None,
+            spring_mass=springs.spring_mass if springs.agree else None,
+            each=[
                 {
                     "name": name,
                     "period": d.estimates["period"],
@@ -201,24 +288,23 @@ def comparison_json(compared: SpringComparison, provenance: Mapping[str, Any]) -
                 }
                 for name, d, k, u_own, pull in each
             ],
-        },
+        ),
         "joint_damping": [
-            {
-                **picked(joint, ("runs", "one_law", "selected", "admissible", "message")),
-                "laws": {name: _law(fit) for name, fit in joint.fits.items()},
-            }
+            fields_of(JointLaws, joint, laws={name: _law(fit) for name, fit in joint.fits.items()})
             for joint in compared.joint
         ],
         "findings": compared.findings,
+        "runs": results,
+        "provenance": provenance,
     }
     if compared.line is not None:
-        content["mass_line"] = picked(compared.line, ("constant", "effective_mass", "chi2", "dof"))
+        content["mass_line"] = fields_of(LineOfMasses, compared.line)
     if compared.hooke is not None:
         content["hooke"] = {"constant": compared.hooke.constant, "normalised_error": compared.normalised_error}
     if compared.reported:
         content["reported"] = compared.reported
-    content |= {"runs": [run.result for run in runs], "provenance": provenance}
-    return {key: plain(value) for key, value in content.items()}
+    every: Mapping[str, object] = content
+    return {key: plain(every[key]) for key in ComparisonResult.__annotations__ if key in every}
 
 
 def _moving(run: Run) -> Oscillation:
@@ -250,7 +336,6 @@ def _findings(comparison: Comparison, joint: Sequence[JointDamping]) -> list[Fin
     return [word(code) for code in findings]
 
 
-def _law(fit: JointFit) -> dict[str, Any]:
-    keys = ("reduced_chi2", "dof", "bic", "excess_chi2", "excess_dof", "rejection")
+def _law(fit: JointFit) -> JointLaw:
     coefficients = {name: limited(fit.law, name, x) for name, x in fit.coefficients.items()}
-    return {"parameters": parameters_json(coefficients), **picked(fit, keys)}
+    return fields_of(JointLaw, fit, parameters=parameters_json(coefficients))

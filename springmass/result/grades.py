@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 from pipeline.analyse import Analysis
 from pipeline.findings.finding import Finding, kinds
@@ -103,14 +103,6 @@ def _sized(analysis: Analysis, name: str, x: Estimate) -> Iterator[Reason]:
             yield Reason("do not quote", greatest, f"{share}{label}")
         else:
             yield Reason("uncertain", greatest, label)
-
-
-def grades_json(analysis: Analysis) -> dict[str, Any]:
-    """Return the grade of every number and its reasons, as JSON has them."""
-    return {
-        name: {"grade": graded.grade, "reasons": [reason.code for reason in graded.reasons]}
-        for name, graded in grades_of(analysis).items()
-    }
 
 
 def leaves_more_than_noise(analysis: Analysis) -> bool:

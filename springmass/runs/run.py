@@ -26,6 +26,7 @@ from springmass.result.frames import estimates_frame, run_dataset, samples_datas
 from springmass.result.run_json import (
     NO_DETAILS,
     RESULT_SCHEMA,
+    RunResult,
     details_of,
     input_of,
     plain,
@@ -142,16 +143,16 @@ class Run(Mapping[str, Estimate]):
         """The result as JSON has it: what ``springmass analyse --json`` prints and the report stores."""
         loaded, analysis, classic, how = self.loaded, self.analysis, self.classic, self.how
         parameters = {**how.parameters, "scene": self.scene.to_mapping()}
-        content = {
+        content: RunResult = {
             "schema": RESULT_SCHEMA,
-            "input": input_of(loaded),
-            "recorded": recorded_of(loaded),
-            "quality": {**analysis.quality, "malformed_rows": loaded.recording.malformed_rows},
             # The estimates of the lab report's own method replace those of the analysis.
             "estimates": analysis.estimates if classic is None else classic.estimates,
             **(details_of(analysis) if classic is None else NO_DETAILS),
-            "effects": analysis.effects,
             "findings": analysis.findings,
+            "effects": analysis.effects,
+            "quality": {**analysis.quality, "malformed_rows": loaded.recording.malformed_rows},
+            "input": input_of(loaded),
+            "recorded": recorded_of(loaded),
             "provenance": provenance_of(how.method or how.accuracy, parameters, self.time_utc or now_utc()),
         }
         return {name: plain(value) for name, value in content.items()}

@@ -55,7 +55,7 @@ def test_generated_pages_are_up_to_date(tmp_path: Path) -> None:
     """``python docs/reference/generate.py`` changes nothing."""
     copy = shutil.copytree(DOCS / "reference", tmp_path / "reference")
     runpy.run_path(str(copy / "generate.py"), run_name="__main__")
-    for page in copy.glob("*.md"):
+    for page in [*copy.glob("*.md"), *copy.glob("*.json")]:
         assert page.read_text(encoding="utf-8") == (DOCS / "reference" / page.name).read_text(encoding="utf-8")
 
 

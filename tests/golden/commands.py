@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import functools
 import hashlib
 import io
 import json
@@ -20,8 +21,9 @@ from typing import Any
 
 import h5py
 import numpy as np
+from jsonschema import Draft202012Validator
 
-from tests.golden.inputs import Places
+from tests.golden.inputs import ROOT, Places
 
 Value = str | int | float | bool | tuple[float, float, str]
 """A text, a count, a number, or a number with its standard uncertainty and unit."""
@@ -65,10 +67,35 @@ def outcome(places: Places, words: list[str]) -> Table:
         return table | {"rows": len(rows), "sha256": _digest("\n".join(rows).encode())}
     for number, line in enumerate(filter(None, out.splitlines())):
         with contextlib.suppress(json.JSONDecodeError):
-            table |= dict(_leaves(_prepared(json.loads(line)), str(number) if number else ""))
+            result = json.loads(line)
+            table |= _invalid(result) | dict(_leaves(_prepared(result), str(number) if number else ""))
     if words[0] == "scene":
         table["keys"] = " ".join(sorted(re.findall(r"\[\w+\] \w+|\b\w+_(?:implausible|unusual)\b", out))) or "none"
     return table
+
+
+def _invalid(result: Any) -> Table:
+    """Return where JSON of a run or a comparison differs from the published schema; nothing if it does not."""
+    keys = result if isinstance(result, dict) else ()
+    kind = "RunResult" if "estimates" in keys else "ComparisonResult" if "joint_damping" in keys else None
+    error = None if kind is None else next(_validator(kind).iter_errors(result), None)
+    return {} if error is None else {"invalid": f"{error.json_path}: {error.message}"}
+
+
+@functools.cache
+def _validator(kind: str) -> Draft202012Validator:
+    """Return what checks JSON against a part of the published schema, in which no further fields may stand."""
+
+    def closed(schema: Any) -> Any:
+        if isinstance(schema, list):
+            return [closed(each) for each in schema]
+        if not isinstance(schema, dict):
+            return schema
+        inner = {key: closed(each) for key, each in schema.items()}
+        return inner | {"additionalProperties": False} if "required" in schema else inner
+
+    schema = closed(json.loads((ROOT / "docs/reference/results.schema.json").read_text("utf-8")))
+    return Draft202012Validator(schema | {"anyOf": [{"$ref": f"#/$defs/{kind}"}]})
 
 
 def _refusal(code: int, err: str, words: list[str]) -> Table:
