@@ -166,8 +166,8 @@ def demand_one_spring(scenes: Sequence[tuple[str, Scene]]) -> None:
     missing = [name for name, scene in scenes if scene.bob_mass_kg is None]
     if missing:
         raise ProgramError(
-            f"compare needs the mass of every run's bob; no [bob] mass_kg for {', '.join(missing)}",
-            "give --scene FILE, one for all runs or one for each in their order",
+            f"compare needs the mass of every run's bob; none is stated for {', '.join(missing)}",
+            "give a scene for all runs, or one for each in their order",
             between=": ",
         )
     first, *others = scenes
