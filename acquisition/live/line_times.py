@@ -10,8 +10,8 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -63,11 +63,6 @@ class LineClock:
     u_rate_ppm: float
     read_s: float
     lost: int = 0
-
-    def to_mapping(self) -> dict[str, Any]:
-        """Return the facts as plain data, with None for what is not known."""
-        facts = asdict(self)
-        return {name: None if isinstance(x, float) and not math.isfinite(x) else x for name, x in facts.items()}
 
     def described(self, info: SourceInfo) -> SourceInfo:
         """Return the description of a source with the rate of its lines."""
@@ -266,14 +261,12 @@ def _all_arrived(reads: Reads, at: F8) -> bool:
     """Return whether no line was lost: the earliest arrivals of all stretches then lie on one line over their count."""
     stretches = max(3, min(STRETCHES, at.size // 8))
     late, parts = at - at[-1] / reads.last[-1] * reads.last, np.array_split(np.arange(at.size), stretches)
-    earliest = np.array([rows[np.argmin(late[rows])] for rows in parts])
-    x = reads.last[earliest]
     for _ in range(3):  # the minima are those relative to the line
-        slope, start = np.polyfit(x, at[earliest], 1)
-        late = at - start - slope * reads.last
         earliest = np.array([rows[np.argmin(late[rows])] for rows in parts])
-        x = reads.last[earliest]
-    return bool(np.abs(late[earliest] - np.median(late[earliest])).max() < 0.35 * slope)
+        slope, start = np.polyfit(reads.last[earliest], at[earliest], 1)
+        late = at - start - slope * reads.last
+    minima = np.array([late[rows].min() for rows in parts])
+    return bool(np.abs(minima - np.median(minima)).max() < 0.35 * slope)
 
 
 def _with_losses(reads: Reads, at: F8, gaps: F8) -> tuple[I8, float]:

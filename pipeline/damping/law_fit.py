@@ -20,7 +20,15 @@ from pipeline.damping.laws import LAWS, Drag, Law, in_units, units_of
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.least_squares import Fit
-from pipeline.numerics.levels import BARE_MENTION, COVERAGE, FALSE_ALARM, NEGLIGIBLE, STRONG, normal_quantile
+from pipeline.numerics.levels import (
+    BARE_MENTION,
+    COVERAGE,
+    FALSE_ALARM,
+    NEGLIGIBLE,
+    STRONG,
+    VERY_STRONG,
+    normal_quantile,
+)
 from pipeline.numerics.regression import chi2_quantile, solve_weighted
 from pipeline.track import F8
 
@@ -206,25 +214,23 @@ def weigh(
 def without_beaten(fits: Mapping[str, LawFit]) -> dict[str, LawFit]:
     """Reject all laws if one with a negative coefficient fits better than each of them: then no law holds.
 
-    A better fit of a law that drives the motion does not support the laws that damp it. Its chi-square must be lower
-    than each of theirs by the quantile for the number of additional parameters, or for one, at :data:`FALSE_ALARM`
-    divided by the number of laws.
+    A better fit of a law that drives the motion does not support the laws that damp it. Its BIC, with that coefficient,
+    must be lower than each of theirs by very strong evidence.
     """
-    allowed = [fit for fit in fits.values() if not fit.rejected]
-    rivals = [fit for fit in fits.values() if fit.rejection == "negative"]
-    if not allowed or not rivals:
-        return dict(fits)
-
-    def margin(fit: LawFit, rival: LawFit) -> float:
-        more = max(len(rival.law.parameters) - len(fit.law.parameters), 1)
-        return fit.chi2 - rival.chi2 - chi2_quantile(1.0 - FALSE_ALARM / len(fits), more)
-
-    least, best = max((min(margin(fit, rival) for fit in allowed), rival.name) for rival in rivals)
-    if not least > 0.0:
+    allowed = [fit.bic for fit in fits.values() if not fit.rejected]
+    rivals = {name: _own_bic(fit) for name, fit in fits.items() if fit.rejection == "negative"}
+    best = min(rivals, key=lambda name: rivals[name], default="")
+    if not allowed or not rivals or not min(allowed) - rivals[best] > VERY_STRONG:
         return dict(fits)
     return {
         name: fit if fit.rejected else replace(fit, rejection="beaten", beaten_by=best) for name, fit in fits.items()
     }
+
+
+def _own_bic(fit: LawFit) -> float:
+    """Return the BIC of a fit with its negative coefficients."""
+    count = fit.joint.values.size
+    return fit.chi2 + count * math.log(max(fit.dof + count, 2.0))
 
 
 class LawChoice(NamedTuple):

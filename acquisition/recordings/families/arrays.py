@@ -80,11 +80,13 @@ def _of_hdf5(file: io.BytesIO) -> Iterator[NamedArray]:
     import h5py
 
     with h5py.File(file) as opened:
-        found: list[Any] = []
-        opened.visititems(lambda _, item: found.append(item) if isinstance(item, h5py.Dataset) else None)
-        kept = [each for each in found if each.dtype.kind in "iuf" and 0 < each.ndim <= 2 and "#refs#" not in each.name]
-        _limit(sum(each.size * each.dtype.itemsize for each in kept))
-        for each in kept:
+        datasets: list[Any] = []
+        opened.visititems(lambda _, item: datasets.append(item) if isinstance(item, h5py.Dataset) else None)
+        numeric = [
+            each for each in datasets if each.dtype.kind in "iuf" and 0 < each.ndim <= 2 and "#refs#" not in each.name
+        ]
+        _limit(sum(each.size * each.dtype.itemsize for each in numeric))
+        for each in numeric:
             unit, fill = each.attrs.get("units", ""), each.attrs.get("_FillValue")
             values = each[...].astype(np.float64)
             if fill is not None:

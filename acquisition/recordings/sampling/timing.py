@@ -76,7 +76,7 @@ def find_rate(t: F8, resolution: float, rate_hz: float | None = None) -> tuple[T
     probe = _probe(times)
 
     def share(grid: Timing) -> float:
-        return float(np.mean(snap(probe, grid, resolution)[1]))
+        return float(np.mean(snap(probe, grid)[1]))
 
     for origin in (0.0, float(times[0])):
         grids = [Timing(rate, origin, resolution) for rate in rates]
@@ -84,7 +84,7 @@ def find_rate(t: F8, resolution: float, rate_hz: float | None = None) -> tuple[T
         shares = {grid: share(grid) for grid in grids if median(np.diff(grid.nearest(times[:_PROBE]))) == 1.0}
         best = max(shares, key=lambda grid: shares[grid], default=None)
         if best is not None and shares[best] > _SHARE_ON_GRID:
-            beside = (Timing(rate, origin) for rate in (best.rate_hz - 1.0, best.rate_hz + 1.0) if rate > 0)
+            beside = (Timing(rate, origin, resolution) for rate in (best.rate_hz - 1.0, best.rate_hz + 1.0) if rate > 0)
             near = [grid for grid in beside if abs(grid.rate_hz - rough) <= 1.5 * rough * relative_u]
             return best, relative_u, all(share(grid) < shares[best] for grid in near)
     return Timing(rough, None, resolution), relative_u, False
@@ -122,13 +122,13 @@ def _mean_step(apart: F8, resolution: float) -> tuple[float, float]:
     return step, relative_u
 
 
-def snap(t: F8, grid: Timing, resolution: float) -> tuple[F8, B1]:
+def snap(t: F8, grid: Timing) -> tuple[F8, B1]:
     """Replace each time by the nearest grid point if the two agree within the rounding of the printed time.
 
     Return the times and a mask of those that agree.
     """
     exact = grid.time(grid.nearest(t))
-    agrees = np.abs(exact - t) <= resolution * 0.5001
+    agrees = np.abs(exact - t) <= grid.resolution_s * 0.5001
     return np.where(agrees, exact, t), agrees
 
 

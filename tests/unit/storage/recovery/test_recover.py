@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -142,7 +143,7 @@ def test_no_frame_is_put_together_across_a_break(event: Event, tmp_path: Path) -
 
 def test_the_last_calibration_in_the_log_is_applied(tmp_path: Path) -> None:
     """A calibration made after the start counts for all of the run: what is stored are echo times."""
-    sensor = SensorEntry(0, FAMILY, calibration=Calibration(offset_m=1.0).to_mapping())
+    sensor = SensorEntry(0, FAMILY, calibration=asdict(Calibration(offset_m=1.0)))
     log = WireLogWriter(tmp_path / "run.wire", LogHeader(sensors=(sensor,), mono_ns=0, unix_ns=0))
     for host_ns, data in wire(50):
         append(log, RecordKind.DATA, data, mono_ns=host_ns)
@@ -151,7 +152,7 @@ def test_the_last_calibration_in_the_log_is_applied(tmp_path: Path) -> None:
     with Recorder(tmp_path / "b.wire", LogHeader(sensors=(sensor,), mono_ns=0, unix_ns=0), VirtualClock()) as recorder:
         for host_ns, data in wire(50):
             recorder.put(0, host_ns, data)
-        recorder.event(0, 1, StoredEvent("calibration", Calibration(offset_m=2.0).to_mapping()))
+        recorder.event(0, 1, StoredEvent("calibration", asdict(Calibration(offset_m=2.0))))
     recover(tmp_path / "b.wire", tmp_path / "b.h5")
     with open_run(tmp_path / "a.h5") as first, open_run(tmp_path / "b.h5") as second:
         assert first.samples().distance[0] == pytest.approx(1.3, abs=1e-4)

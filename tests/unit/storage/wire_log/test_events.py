@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -120,7 +121,7 @@ def test_an_event_that_cannot_be_read_is_kept_with_the_reason(tmp_path: Path, pa
 
 def test_a_calibration_is_known_with_any_facts(tmp_path: Path) -> None:
     """All numbers of the calibration are in the run file."""
-    facts = Calibration(offset_m=0.1).to_mapping()
+    facts = asdict(Calibration(offset_m=0.1))
     (event,) = events_in_run_file(tmp_path, json.dumps({"kind": "calibration", "facts": facts}).encode("ascii"))
     assert event.facts == facts
     assert event.typed is not None
