@@ -121,6 +121,8 @@ class Opened:
         points = _table(folder, request["columns"], rows) if rows else None
         names = numbered([card["name"] for card in request["cards"]])
         runs = [self.run(card)[0].named(name) for name, card in zip(names, request["cards"], strict=True)]
+        if any(run.scene.bob_mass_kg is None for run in runs):
+            raise ProgramError("a comparison needs the mass of every bob", "type it on its card")
         if len(runs) > 1:
             compared = compare_runs(runs, static=points)
             parts = [overlay(names, [run.analysis for run in runs]), comparison(compared.comparison)]
