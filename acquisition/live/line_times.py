@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from acquisition.block import F8, I8, U8, Block, Flag, SourceInfo
+from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S
 from acquisition.live.clock_fit import NANO, fit_clock
 
 SAME_READ = 0.25
@@ -40,7 +41,6 @@ IMPOSSIBLE, OFF_BY_ONE = 12.0, 2.3
 """Minus the log likelihood of a line too many, and of one that came with the read before or after its own, 1 in 10."""
 MOST_PLACES = 8
 """Maximum number of lost lines in one read whose places are weighed."""
-SOUND_M_PER_S = 344.0
 U_LOCKED_PPM = 30.0 * math.sqrt(2.0 / 3.0)
 """Standard uncertainty of the rates of two crystals against each other, ppm: each is within 30 ppm at 25 degC."""
 
@@ -205,7 +205,7 @@ def _longer(t: F8, distance_m: F8, step_s: float) -> F8 | None:
     known = np.isfinite(distance_m)
     if known.sum() < FEWEST_LINES:
         return None
-    flight_s = np.interp(t, t[known], 2.0 * distance_m[known] / SOUND_M_PER_S)
+    flight_s = np.interp(t, t[known], 2.0 * distance_m[known] / SPEED_OF_SOUND_M_PER_S)
     step = step_s + flight_s - flight_s.mean()
     if flight_s.std() < 1e-3 * step_s or step.min() < 0.2 * step_s:
         return None

@@ -20,19 +20,20 @@ from acquisition.recordings.tables.format import ColumnFormat
 from acquisition.recordings.tables.headings import Heading, heading_of, is_time
 from acquisition.recordings.tables.layout import times_by_name, times_by_steps
 from acquisition.recordings.tables.table import Column, Header, Table, side_by_side
+from acquisition.recordings.tables.text import ZIP_MAGIC
 from acquisition.units import time_unit
 
 MOST_ARRAY_BYTES = 1 << 28
 """Maximum size of all arrays of a file, bytes."""
 _FEWEST, _MOST_COLUMNS = 3, 32
-_ZIP, _HDF5 = b"PK\x03\x04", b"\x89HDF\r\n\x1a\n"
+_HDF5 = b"\x89HDF\r\n\x1a\n"
 _REMEDY = "save times and values as CSV"
 NamedArray = tuple[str, str, Any]
 """Name, unit and values."""
 
 
 def _evidence(head: bytes) -> str:
-    if head.startswith(b"\x93NUMPY") or (head.startswith(_ZIP) and head[30:128].partition(b".npy")[1]):
+    if head.startswith(b"\x93NUMPY") or (head.startswith(ZIP_MAGIC) and head[30:128].partition(b".npy")[1]):
         return "it begins with the bytes of numpy's files"
     if head.startswith((b"MATLAB 5.0 MAT", b"MATLAB 7.3 MAT")):
         return "it begins with the bytes of a MATLAB file"
@@ -41,8 +42,8 @@ def _evidence(head: bytes) -> str:
 
 def _arrays(data: bytes) -> Iterator[NamedArray]:
     file = io.BytesIO(data)
-    if data.startswith((b"\x93NUMPY", _ZIP)):
-        if data.startswith(_ZIP):
+    if data.startswith((b"\x93NUMPY", ZIP_MAGIC)):
+        if data.startswith(ZIP_MAGIC):
             _limit(sum(each.file_size for each in zipfile.ZipFile(file).infolist()))
         read = np.load(file, allow_pickle=False)
         for name, array in [("", read)] if isinstance(read, np.ndarray) else read.items():

@@ -202,13 +202,12 @@ def _join_traps(p: Samples, v: Samples, from_p: I8, from_v: I8) -> Iterator[Form
     for trap in v.traps:
         if trap.code not in ("nominal_clock", "rate_assumed", "rate_given"):
             yield replace(trap, message=f"in {v.name}: {trap.message}")
-    alone_p, alone_v = int(np.count_nonzero(from_v < 0)), int(np.count_nonzero(from_p < 0))
-    if alone_v:
-        message = f"{alone_v} times are only in the velocity file, so they have no distance"
-        yield FormatIssue("missing_samples", message, alone_v)
-    if alone_p:
-        message = f"{alone_p} times are only in the position file, so they have no velocity"
-        yield FormatIssue("velocity_missing", message, alone_p)
+    for lacking, code, file, value in (
+        (from_p, "missing_samples", "velocity", "distance"),
+        (from_v, "velocity_missing", "position", "velocity"),
+    ):
+        if count := int(np.count_nonzero(lacking < 0)):
+            yield FormatIssue(code, f"{count} times are only in the {file} file, so they have no {value}", count)
     # The velocity of a sample must be its difference from the previous position, multiplied by the rate.
     both = np.flatnonzero((from_p[1:] >= 0) & (from_v[1:] >= 0) & (from_p[:-1] >= 0)) + 1
     x, rate_hz = p.block.distance, p.timing.rate_hz

@@ -283,17 +283,15 @@ def _in_bursts(path: str, t: F8, resolution: float, rate_hz: float | None) -> Ti
     if not mean > 0.0 or steps.min() < 0.0:
         return None
     within, between = steps < _SHORT_STEP * mean, steps >= mean
-    if np.count_nonzero(within) < 0.5 * (steps.size - 1) or np.mean(within | between) < _CLEAR_STEPS:
-        return None
     last: I8 = np.flatnonzero(between)
-    if last.size < _FEWEST_BURSTS:
+    few = last.size < _FEWEST_BURSTS or np.count_nonzero(within) < 0.5 * (steps.size - 1)
+    if few or np.mean(within | between) < _CLEAR_STEPS:
         return None
     intervals = np.diff(t[last])
     interval = median(intervals)
     size = t.size / (last.size + 1)
-    if np.mean(np.abs(intervals - interval) < 0.5 * interval) < _REGULAR_INTERVALS:
-        return None
-    if size < _SAME_TIME and not steps[within].any():
+    regular = np.mean(np.abs(intervals - interval) < 0.5 * interval) >= _REGULAR_INTERVALS
+    if not regular or (size < _SAME_TIME and not steps[within].any()):
         return None
     step, start = (float(each) for each in np.polyfit(last, t[last], 1))
     bursts = f"bursts of {size:.3g} samples every {1e3 * interval:.4g} ms"

@@ -67,7 +67,7 @@ def test_an_event_has_its_facts_in_the_run_file_and_its_type_again(
 ) -> None:
     """From the recorder to the provenance of the run file; facts that are not stated are not written."""
     with Recorder(tmp_path / "run.wire", HEADER, VirtualClock()) as recorder:
-        recorder.put(0, 1, b"R1000\r")
+        recorder.reads([(0, 1, b"R1000\r")])
         recorder.event(0, 2, event)
     with open_run(recover(tmp_path / "run.wire").main.path) as run:
         (entry,) = run.provenance["events"]
