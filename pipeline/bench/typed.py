@@ -59,7 +59,7 @@ SCALES: dict[str, dict[str, Scale]] = {
 
 _SIGNS = str.maketrans({"\u2212": "-", "\u2013": "-", "µ": "u", "μ": "u", "\u00a0": " ", "\u202f": " "})
 _FLOAT = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_UNIT_TWICE = re.compile(rf"({_FLOAT})\s*(\S+?)\s*(?:\+/-|\+-|±)\s*({_FLOAT})\s*\2")
+_UNIT_TWICE = re.compile(rf"({_FLOAT})\s*(?![eE][-+]?\d)([^\s\d.()+-]\S*?)\s*(?:\+/-|\+-|±)\s*({_FLOAT})\s*\2")
 _TYPED = re.compile(rf"(\(?\s*{_FLOAT}(?:\(\d*\.?\d+\))?(?:\s*(?:\+/-|\+-|±)\s*{_FLOAT})?\s*\)?)\s*(\S.*)?")
 
 
