@@ -10,9 +10,9 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from acquisition.units import SPELLINGS
+from acquisition.units import MEASURES, SPELLINGS
 
-LENGTHS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
+LENGTHS_M = {unit: 10.0 ** MEASURES[unit].power * MEASURES[unit].factor for unit in ("m", "cm", "mm", "in")}
 TIMES_US = {"us": 1.0, "ms": 1e3, "s": 1e6}
 
 _OTHERS = {

@@ -33,10 +33,9 @@ from pipeline.findings.scene import scene_findings
 from pipeline.motion.at_rest import Rest
 from pipeline.motion.fitted import Oscillation
 from pipeline.motion.kinds import Motion, fit_motion
-from pipeline.motion.lines import Apart, find_apart
+from pipeline.motion.lines import Apart, TwoModes, find_apart
 from pipeline.motion.pendulum import with_law_of_pendulum
 from pipeline.motion.relaxation import Relaxation
-from pipeline.motion.two_modes import TwoModes
 from pipeline.notice import Notice
 from pipeline.numerics.levels import ROUNDS
 from pipeline.numerics.threads import one_thread

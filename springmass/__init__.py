@@ -1,7 +1,7 @@
 """springmass: from a rangefinder's samples to period, spring constant and damping law.
 
 The program combines acquisition, pipeline and storage. `cli` runs a command line, and `commands` do the work by means
-of `runs`, `session`, `report` and `trade`. Scripts may rely on the names exported here; everything else may move.
+of `runs`, `session` and `report`. Scripts may rely on the names exported here; everything else may move.
 
 Examples
 --------

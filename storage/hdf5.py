@@ -1,4 +1,4 @@
-"""Enter HDF5: the only two ways by which springmass writes and reads HDF5 files, with errors of one line."""
+"""Write and read run files by HDF5, whole or not at all, with errors of one line."""
 
 from __future__ import annotations
 

@@ -130,14 +130,10 @@ class Recorder:
         """Record reads of ports. This never waits for the disk and never raises a disk error."""
         self._offer(RecordKind.DATA, reads)
 
-    def put(self, channel: int, host_ns: int, data: bytes) -> None:
-        """Record the bytes of one read of a port."""
-        self.reads(((channel, host_ns, data),))
-
-    def mark(self, text: str, *, host_ns: int | None = None, channel: int = 0) -> None:
+    def mark(self, text: str, *, host_ns: int | None = None) -> None:
         """Record a mark."""
         now = self._clock.now_ns() if host_ns is None else host_ns
-        self._offer(RecordKind.MARK, ((channel, now, text.encode("utf-8", "replace")),))
+        self._offer(RecordKind.MARK, ((0, now, text.encode("utf-8", "replace")),))
 
     def event(self, channel: int, host_ns: int, event: StoredEvent | Event) -> None:
         """Record an event."""
@@ -196,8 +192,8 @@ class Recorder:
                 self._dropped_records += 1
                 self._dropped_bytes += len(payload)
                 if accepting:
-                    first = {"records": 0, "bytes": 0, "first_ns": mono_ns}
-                    lost = self._overflows[channel][1] if channel in self._overflows else first
+                    none = {"records": 0, "bytes": 0, "first_ns": mono_ns}
+                    lost = self._overflows.get(channel, (0, none))[1]
                     more = {"records": lost["records"] + 1, "bytes": lost["bytes"] + len(payload)}
                     self._overflows[channel] = mono_ns, lost | more
             if not was_waiting and (self._queue or self._overflows):

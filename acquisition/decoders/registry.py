@@ -107,14 +107,10 @@ def _frame_size(data: bytes) -> int | None:
     In noise each of 256 values has the probability 1/256, so ten frames in which one is the same nine times are none.
     """
     for size in range(3, 33):
-        columns = [data[at::size] for at in range(size)]
-        if len(data) >= 10 * size and any(map(_constant, columns)):
+        columns = [data[at::size] for at in range(size)] if len(data) >= 10 * size else []
+        if any(max(map(column.count, set(column))) >= 0.9 * len(column) for column in columns):
             return size
     return None
-
-
-def _constant(column: bytes) -> bool:
-    return max(map(column.count, set(column))) >= 0.9 * len(column)
 
 
 def _share(family: Sensor, data: bytes) -> float:

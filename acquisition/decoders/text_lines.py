@@ -9,7 +9,6 @@ counted as ``bad_frame``.
 from __future__ import annotations
 
 import contextlib
-import math
 import re
 from collections import Counter
 from collections.abc import Mapping
@@ -51,7 +50,7 @@ _NO_TARGET = re.compile(
     re.IGNORECASE,
 )
 
-FoundNumber = tuple[str, list[Number], list[tuple[int, int]]]
+NumberedLine = tuple[str, list[Number], list[tuple[int, int]]]
 """A line, its numbers, and where its cells begin and end."""
 
 
@@ -89,7 +88,7 @@ class TextLinesDecoder(FramedDecoder):
         self._last = self._step = 0.0
         self._steps = 0
         self._names: Counter[tuple[str, str]] = Counter()  # words before the distances, each with its unit
-        self._largest = self._smallest = math.nan  # of the distances without a unit
+        self._span: tuple[float, ...] = ()  # the smallest and the largest of the distances without a unit
 
     def reading(self, host_ns: int, frame: bytes) -> Reading | None:
         """Return the reading of a line, or None; count the fault of a line without a reading."""
@@ -98,7 +97,7 @@ class TextLinesDecoder(FramedDecoder):
             noise = bool(frame.strip(b"\r "))
             self._count("bad_frame" if noise else "blank_line", len(frame) + 1 if noise else 0)
             return None
-        line = self._found(text)
+        line = self._numbered(text)
         # Before the first distance nothing shows that such lines stand for one.
         silent = self._column is None and _NO_TARGET.search(text) is not None
         number = None if silent else self._distance(line)
@@ -139,7 +138,7 @@ class TextLinesDecoder(FramedDecoder):
     @property
     def assumed_unit(self) -> str:
         """``cm`` if no unit was printed or stated."""
-        return "cm" if self._largest == self._largest else ""
+        return "cm" if self._span else ""
 
     def _note(self, number: Number) -> None:
         """Note the words before a distance and its size, from which a question may follow."""
@@ -147,8 +146,7 @@ class TextLinesDecoder(FramedDecoder):
             if self._column is None:
                 self._names[" ".join(number.before.split()).strip(" :=>").strip(), number.unit] += 1
             if not (number.unit or self._unit):
-                self._largest = max(number.value, self._largest) if self._largest == self._largest else number.value
-                self._smallest = min(number.value, self._smallest) if self._smallest == self._smallest else number.value
+                self._span = min((number.value, *self._span)), max((number.value, *self._span))
 
     @property
     def _in_turn(self) -> list[str]:
@@ -161,7 +159,7 @@ class TextLinesDecoder(FramedDecoder):
     @property
     def _may_be_metres(self) -> bool:
         """Whether numbers without a unit would be nearer than any sensor of this kind measures, if they were cm."""
-        return self._smallest > 0.0 and self._largest < 100.0 * FAMILY.range_m[0]
+        return bool(self._span) and self._span[0] > 0.0 and self._span[1] < 100.0 * FAMILY.range_m[0]
 
     def unread(self, data: bytes) -> Guess:
         """Return what the lines look like that gave no reading, and which options would read them."""
@@ -170,12 +168,11 @@ class TextLinesDecoder(FramedDecoder):
             names = ", ".join(self._in_turn)
             return Guess(f"looks like lines of several sensors in turn ({names})", ({"column": self._in_turn[0]},))
         if self._may_be_metres:
-            span = f"{self._smallest:g} to {self._largest:g}"
-            looks = f"looks like distances without a unit ({span}), too short for cm"
+            looks = "looks like distances without a unit ({:g} to {:g}), too short for cm".format(*self._span)
             return Guess(looks, ({"unit": "m"},), ("if they are metres",))
         splitter = LineSplitter(b"\n", LONGEST_TEXT_LINE, {"garbage_bytes": 0, "bad_frame": 0}, other_ends=OTHER_ENDS)
         lines = [text for line in splitter.split(data)[1:] if (text := _text(line))]
-        distance_lines = [line for line in map(self._found, lines) if not all(number.is_other for number in line[1])]
+        distance_lines = [line for line in map(self._numbered, lines) if not all(number.is_other for number in line[1])]
         if not distance_lines:
             return Guess(f"looks like text lines without a distance ({(lines or [''])[0][:40]!r})")
         text, in_line, cells = distance_lines[-1]
@@ -197,14 +194,14 @@ class TextLinesDecoder(FramedDecoder):
         options |= {"time": str(min(even)), "time_unit": "ms"} if even else {}
         return Guess(f"{quoted}, of which one is the distance", (options,), ("if these are its column and unit",))
 
-    def _found(self, text: str) -> FoundNumber:
+    def _numbered(self, text: str) -> NumberedLine:
         comma = has_decimal_comma(text, self._separator)
         separator = re.escape(self._separator) if self._separator else r"[\s;]+" if comma else r"[\s,;]+"
         ends = [match.span() for match in re.finditer(separator, text)]
         cells = list(zip([0, *(end for _, end in ends)], [*(start for start, _ in ends), len(text)], strict=True))
         return text, numbers(text, decimal_comma=bool(comma), colon_separates=self._separator == ":"), cells
 
-    def _distance(self, line: FoundNumber) -> Number | None:
+    def _distance(self, line: NumberedLine) -> Number | None:
         text, in_line, _ = line
         if self._column is not None:
             number = _at(self._column, line)
@@ -247,7 +244,7 @@ def _text(line: bytes) -> str:
     return text if text.replace("\t", " ").isprintable() else ""
 
 
-def _at(where: int | str, line: FoundNumber) -> Number | None:
+def _at(where: int | str, line: NumberedLine) -> Number | None:
     """Return the number in a cell, given by its index, or behind a name; None unless it is the only one there."""
     _, in_line, cells = line
     if isinstance(where, int):
@@ -264,14 +261,14 @@ def _cell(number: Number, cells: list[tuple[int, int]]) -> int:
     return next(index for index, (begin, end) in enumerate(cells) if begin <= number.start <= end)
 
 
-def _counts(cell: int, lines: list[FoundNumber]) -> bool:
+def _counts(cell: int, lines: list[NumberedLine]) -> bool:
     """Return whether the numbers of a cell count evenly, apart from lines that were lost."""
     values = [number.value for line in lines if (number := _at(cell, line)) is not None]
     steps = [b - a for a, b in pairwise(values)]
     return len(steps) >= 4 and min(steps) > 0 and sorted(steps)[3 * len(steps) // 4] <= 1.5 * min(steps)
 
 
-def _whole(where: int | str | None, line: FoundNumber) -> int | None:
+def _whole(where: int | str | None, line: NumberedLine) -> int | None:
     """Return the number in a column, rounded; -1 without a column, None without a valid number of at least 0."""
     if where is None:
         return -1
@@ -287,7 +284,7 @@ class _PrintedClock:
         self._last = self._step = self._turns = 0.0
         self._first = True
 
-    def read(self, where: int | str | None, line: FoundNumber) -> int | None:
+    def read(self, where: int | str | None, line: NumberedLine) -> int | None:
         """Return the time in a column, us; -1 without a column, None without a time."""
         if where is None:
             return -1

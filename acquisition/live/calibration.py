@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -55,13 +55,9 @@ class Calibration:
         rest_m = (point.rest_m - before.offset_m) * ratio + self.offset_m
         return StillPoint(rest_m, point.u_rest_m * ratio, point.noise_m * ratio, point.samples)
 
-    def to_mapping(self) -> dict[str, Any]:
-        """Return the numbers of the calibration by name, for the log and the run file."""
-        return asdict(self)
-
     @classmethod
     def from_mapping(cls, numbers: Mapping[str, Any]) -> Calibration:
-        """Return the calibration from a result of :meth:`to_mapping`; unknown names raise a CalibrationError."""
+        """Return the calibration of numbers by name, as logs have them; unknown names raise a CalibrationError."""
         try:
             return cls(**{name: float(value) for name, value in numbers.items()})
         except (TypeError, ValueError) as error:

@@ -52,9 +52,10 @@ class ClockFit:
     steps: int = 0
     span_s: float = 0.0
 
-    def to_mapping(self) -> dict[str, Any]:
-        """Return the comparison as plain data, with None for what the host times do not give."""
-        return {name: value if math.isfinite(value) else None for name, value in asdict(self).items()}
+
+def facts_of(clock: Any) -> dict[str, Any]:
+    """Return what is known of a clock as plain data, with None for numbers that the host times do not give."""
+    return {name: None if isinstance(x, float) and not math.isfinite(x) else x for name, x in asdict(clock).items()}
 
 
 class ClockSamples:

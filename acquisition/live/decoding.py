@@ -17,7 +17,7 @@ from acquisition.decoders.decoder import Decoder, DeviceStatus
 from acquisition.decoders.sensor import Sensor
 from acquisition.errors import SensorError
 from acquisition.live.calibration import Calibration
-from acquisition.live.clock_fit import COUNTER_PPM, ClockSamples
+from acquisition.live.clock_fit import COUNTER_PPM, ClockSamples, facts_of
 from acquisition.live.line_times import Arrivals, settled
 from acquisition.live.timebase import Timebase, demand_within
 from acquisition.readings import NO_READINGS, Reading, Readings, carried
@@ -181,8 +181,8 @@ class SensorChain:
                 "kind": self.timebase.clock,
                 "moment": "reflection" if self._at_reflection else "reading",
                 "limit_ppm": self.clock_ppm,
-                **self._clock.fit().to_mapping(),
-                **({} if self._arrivals is None else {"lines": self._arrivals.clock.to_mapping()}),
+                **facts_of(self._clock.fit()),
+                **({} if self._arrivals is None else {"lines": facts_of(self._arrivals.clock)}),
             },
         }
 

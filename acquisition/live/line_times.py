@@ -10,12 +10,13 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from acquisition.block import F8, I8, U8, Block, Flag, SourceInfo
+from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S
 from acquisition.live.clock_fit import NANO, fit_clock
 
 SAME_READ = 0.25
@@ -40,7 +41,6 @@ IMPOSSIBLE, OFF_BY_ONE = 12.0, 2.3
 """Minus the log likelihood of a line too many, and of one that came with the read before or after its own, 1 in 10."""
 MOST_PLACES = 8
 """Maximum number of lost lines in one read whose places are weighed."""
-SOUND_M_PER_S = 344.0
 U_LOCKED_PPM = 30.0 * math.sqrt(2.0 / 3.0)
 """Standard uncertainty of the rates of two crystals against each other, ppm: each is within 30 ppm at 25 degC."""
 
@@ -63,11 +63,6 @@ class LineClock:
     u_rate_ppm: float
     read_s: float
     lost: int = 0
-
-    def to_mapping(self) -> dict[str, Any]:
-        """Return the facts as plain data, with None for what is not known."""
-        facts = asdict(self)
-        return {name: None if isinstance(x, float) and not math.isfinite(x) else x for name, x in facts.items()}
 
     def described(self, info: SourceInfo) -> SourceInfo:
         """Return the description of a source with the rate of its lines."""
@@ -210,7 +205,7 @@ def _longer(t: F8, distance_m: F8, step_s: float) -> F8 | None:
     known = np.isfinite(distance_m)
     if known.sum() < FEWEST_LINES:
         return None
-    flight_s = np.interp(t, t[known], 2.0 * distance_m[known] / SOUND_M_PER_S)
+    flight_s = np.interp(t, t[known], 2.0 * distance_m[known] / SPEED_OF_SOUND_M_PER_S)
     step = step_s + flight_s - flight_s.mean()
     if flight_s.std() < 1e-3 * step_s or step.min() < 0.2 * step_s:
         return None
@@ -266,14 +261,12 @@ def _all_arrived(reads: Reads, at: F8) -> bool:
     """Return whether no line was lost: the earliest arrivals of all stretches then lie on one line over their count."""
     stretches = max(3, min(STRETCHES, at.size // 8))
     late, parts = at - at[-1] / reads.last[-1] * reads.last, np.array_split(np.arange(at.size), stretches)
-    earliest = np.array([rows[np.argmin(late[rows])] for rows in parts])
-    x = reads.last[earliest]
     for _ in range(3):  # the minima are those relative to the line
-        slope, start = np.polyfit(x, at[earliest], 1)
-        late = at - start - slope * reads.last
         earliest = np.array([rows[np.argmin(late[rows])] for rows in parts])
-        x = reads.last[earliest]
-    return bool(np.abs(late[earliest] - np.median(late[earliest])).max() < 0.35 * slope)
+        slope, start = np.polyfit(reads.last[earliest], at[earliest], 1)
+        late = at - start - slope * reads.last
+    minima = np.array([late[rows].min() for rows in parts])
+    return bool(np.abs(minima - np.median(minima)).max() < 0.35 * slope)
 
 
 def _with_losses(reads: Reads, at: F8, gaps: F8) -> tuple[I8, float]:

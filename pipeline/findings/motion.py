@@ -15,9 +15,8 @@ from pipeline.motion.at_rest import Rest
 from pipeline.motion.by_samples import FEW_WINDOWS
 from pipeline.motion.fitted import Oscillation, RestPosition
 from pipeline.motion.kinds import Motion
-from pipeline.motion.lines import Apart, find_several
+from pipeline.motion.lines import Apart, TwoModes, find_several
 from pipeline.motion.relaxation import Relaxation
-from pipeline.motion.two_modes import TwoModes
 from pipeline.notice import Notice
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.levels import NOTICEABLE, VERY_STRONG

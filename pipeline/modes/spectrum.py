@@ -221,7 +221,7 @@ def _autoregression(y: F8, highest: int) -> tuple[F8, float]:
     found = []
     for order in range(covariances.size):
         rows, right = np.arange(order), covariances[1 : order + 1]
-        coefficients = np.linalg.lstsq(covariances[np.abs(np.subtract.outer(rows, rows))], right)[0]
+        coefficients = np.linalg.lstsq(covariances[np.abs(np.subtract.outer(rows, rows))], right, rcond=None)[0]
         variance = max(float(covariances[0] - coefficients @ right), 1e-300)
         found.append((math.log(variance) + order * math.log(n) / n, coefficients, variance))
     _, coefficients, variance = min(found, key=lambda each: each[0])

@@ -8,23 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.errors import AnalysisError
+from pipeline.motion.fitted import ClosedMotion
 from pipeline.notice import Refusal
-from pipeline.numerics.estimate import Estimate, Joint
+from pipeline.numerics.estimate import Joint
 from pipeline.numerics.regression import correlation_length
 from pipeline.samples.condition import COARSE, Samples, coarsest_step
-from pipeline.track import F8, U8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rest:
+class Rest(ClosedMotion):
     """A bob at rest, or a recording whose motion is none that can be fitted."""
 
-    joint: Joint  # the rest position, in the record's values
-    dof: float  # number of independent samples less one
-    noise: Estimate  # of one sample
-    start_s: float
-    residual: F8  # (n,)
-    flags: U8  # (n,)
     why: Refusal
 
 
@@ -45,4 +39,12 @@ def rest_of(samples: Samples, why: Refusal) -> Rest:
         u = math.hypot(u, quantum / math.sqrt(12.0))  # rounding error, which noise does not average out
     first_s = float(samples.track.t[used][0])
     joint = Joint(("rest",), np.array([mean]), np.array([[u**2]]), (unit,))
-    return Rest(joint, max(independent - 1.0, 1.0), noise, first_s, samples.track.y - mean, samples.flags, why)
+    return Rest(
+        joint=joint,
+        dof=max(independent - 1.0, 1.0),
+        noise=noise,
+        start_s=first_s,
+        residual=samples.track.y - mean,
+        flags=samples.flags,
+        why=why,
+    )

@@ -16,7 +16,7 @@ from pipeline.damping.select import Damping
 from pipeline.modes.mode import Modes
 from pipeline.motion.frequency import Bend, TimeTable, turns
 from pipeline.notice import Refusal
-from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.regression import Scatter
 from pipeline.track import F8, U8
 from pipeline.windows.demodulate import Windows
@@ -149,6 +149,18 @@ class Oscillation:
         if phase.small_swings is not None and phase.of_amplitude:
             return float(first / phase.small_swings.value - 1.0)
         return float((last - first) / phase.angular_frequency.value)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ClosedMotion:
+    """A motion with few parameters and no laws."""
+
+    joint: Joint  # its parameters, in the record's times and values
+    dof: float  # number of independent samples less that of the parameters
+    noise: Estimate  # of one sample
+    start_s: float  # time at which the fitted part of the motion begins
+    residual: F8  # (n,) what the motion leaves of every sample, NaN before the start
+    flags: U8  # (n,) with those before the start as outside
 
 
 def delay(t: F8, lag: TimeTable | None) -> F8 | float:

@@ -22,9 +22,8 @@ from pipeline.motion.averaged import fit_windows, typical_miss
 from pipeline.motion.by_samples import FEW_WINDOWS, fit_samples
 from pipeline.motion.equation import drags, fit_equation
 from pipeline.motion.fitted import Oscillation
-from pipeline.motion.lines import WEAKER, find_several
+from pipeline.motion.lines import WEAKER, TwoModes, find_several, find_two_modes
 from pipeline.motion.relaxation import LEAST_DAMPING, Relaxation, find_relaxation
-from pipeline.motion.two_modes import TwoModes, find_two_modes
 from pipeline.notice import Refusal
 from pipeline.numerics.levels import FEWEST_FOR_LINE, NEGLIGIBLE, NOTICEABLE, VERY_STRONG
 from pipeline.options import Options

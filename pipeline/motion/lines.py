@@ -12,6 +12,9 @@ import numpy as np
 from pipeline.modes.mode import rotating
 from pipeline.modes.search import HIGHEST_MODE
 from pipeline.motion.fit import Rows, fit
+from pipeline.motion.fitted import ClosedMotion
+from pipeline.notice import Refusal
+from pipeline.numerics.estimate import Joint
 from pipeline.numerics.levels import (
     FEWEST_FOR_CURVE,
     FEWEST_FOR_MEDIAN,
@@ -21,7 +24,7 @@ from pipeline.numerics.levels import (
     OUTLIER,
     ROUNDS,
 )
-from pipeline.numerics.regression import beyond, correlation_length
+from pipeline.numerics.regression import correlation_length
 from pipeline.numerics.robust import median
 from pipeline.samples.condition import ONE_VALUE, Samples
 from pipeline.track import F8, Bools
@@ -35,7 +38,9 @@ MAINS_HZ, MAINS_SHARE = (50.0, 60.0, 100.0, 120.0), 0.01
 # Distance in bins, the reciprocals of the length of the record, within which a decay or a change of the frequency has
 # sidebands, as measured on the wide pendulum and the lost rows of `python -m tests.trials.grades kinds`.
 SIDEBANDS = 3.0
-
+# Minimum number of beats in the record; with fewer, two modes cannot be distinguished from one that changes:
+BEATS = 0.8  # those of tests/properties/test_no_oscillation.py at a ratio of 1.02 beat less than once
+MODE_PARAMETERS = ("rest", *(f"{m}_{n}" for m in ("first", "second") for n in ("cosine", "sine", "omega", "decay")))
 
 Cause = Literal["drive", "mains", "overtone"]
 """What keeps up a line that is not the free oscillation's, or that it is an overtone."""
@@ -224,6 +229,58 @@ def find_several(samples: Samples) -> DecayingLines | None:
     return None
 
 
+class TwoModes(ClosedMotion):
+    """Two oscillations, the stronger ("first") and the other one, neither of which is the main one.
+
+    The parameters are the rest position, then the cosine and sine amplitudes at ``start_s``, angular frequency and
+    decay rate of each mode.
+    """
+
+
+def find_two_modes(samples: Samples) -> TwoModes | Refusal:
+    """Return the two modes that a record consists of, or refuse them if they do not describe it.
+
+    :math:`o + \\sum_i e^{-g_i t}(a_i\\cos\\omega_i t + b_i\\sin\\omega_i t)` is fitted to all samples used, started
+    from the strongest line of the spectrum and the strongest line of the residual of the first. Covariances are scaled
+    by the residuals, including their correlation.
+    """
+    if (record := Scaled.of(samples)) is None:
+        return Refusal("no_two_modes")
+    first = record.strongest(record.values)
+    second = record.strongest(record.less(record.linear((first, 0.0))))
+    lines = record.fitted(record.linear((first, 0.0), (second, 0.0)))
+    if lines is None or not lines.left < NEGLIGIBLE:
+        return Refusal("no_two_modes")
+    strong, weak = np.argsort(-lines.sizes).tolist()
+    omegas, sizes = lines.omegas, lines.sizes
+    beats = abs(omegas[0] - omegas[1]) * record.seconds / (2.0 * math.pi)
+    slow, fast = float(np.min(omegas)), float(np.max(omegas))
+    few = slow * record.seconds < 2.0 * math.pi * FEWEST_FOR_MEDIAN or beats < BEATS
+    if few or sizes[weak] < WEAKER * sizes[strong]:
+        return Refusal("no_two_modes")
+    # A component at a multiple of the slower frequency is not a second mode but a harmonic, as of a square wave.
+    if round(fast / slow) > 1 and abs(fast - round(fast / slow) * slow) * record.seconds < math.pi:
+        return Refusal("no_two_modes")
+    order = [0, *(k for i in (strong, weak) for k in range(1 + 4 * i, 5 + 4 * i))]
+    # Back to the unit of the record; the rest position was measured from the mean.
+    scale, unit = record.scale, samples.track.unit
+    turn = np.array([scale, *(2 * (scale, scale, 1.0, 1.0))])
+    level = np.array([record.level, *(8 * (0.0,))])
+    units = (unit, *(2 * (unit, unit, "rad/s", "1/s")))
+    covariance = lines.covariance[np.ix_(order, order)] * np.outer(turn, turn)
+    joint = Joint(MODE_PARAMETERS, lines.values[order] * turn + level, covariance, units)
+    residual = np.full(len(samples.track), np.nan)
+    residual[record.used] = scale * lines.residual
+    return TwoModes(
+        joint=joint,
+        dof=lines.dof,
+        noise=samples.noise_estimate,
+        start_s=record.start_s,
+        residual=residual,
+        flags=samples.flags,
+    )
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Apart:
     """A line that is not the free oscillation's, and that is subtracted before the analysis."""
@@ -290,8 +347,11 @@ def _others(record: Scaled, first: float, omega: F8, power: F8) -> Iterator[floa
         first, rate = float(single.omegas[0]), max(float(single.rates[0]), 0.0)
     wave = rotating(np.exp(-rate * record.tau), first * record.tau)
     # Times the time too, because what falls is no exponential alone.
-    columns = np.stack([np.ones(wave.size), *(x for each in (wave, record.tau * wave) for x in (each.real, each.imag))])
-    left = record.spectrum(beyond(np.linalg.qr(columns.T)[0], record.values), 2)[1]
+    share = record.tau / record.seconds
+    rows = np.stack([np.ones(wave.size), *(x for each in (wave, share * wave) for x in (each.real, each.imag))])
+    # Normal equations of five rows take a tenth of the time of a decomposition.
+    size = np.linalg.lstsq(rows @ rows.T, rows @ record.values, rcond=None)[0]
+    left = record.spectrum(record.values - size @ rows, 2)[1]
     room = math.tau / record.seconds
     beside = np.abs(omega - first * np.round(omega / first))
     far = (omega > HIGHEST_MODE * first) & (beside > room + NOTICEABLE * omega)

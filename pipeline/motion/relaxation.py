@@ -18,6 +18,7 @@ from typing import Literal
 import numpy as np
 
 from pipeline.motion.fit import Rows, allowed
+from pipeline.motion.fitted import ClosedMotion
 from pipeline.notice import Refusal
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate, Joint
@@ -25,7 +26,7 @@ from pipeline.numerics.least_squares import CENTRAL_STEP, Fit
 from pipeline.numerics.levels import FEWEST_FOR_CURVE, NEGLIGIBLE, STRONG, VERY_STRONG
 from pipeline.numerics.regression import correlation_length, covariance_of
 from pipeline.samples.condition import LARGEST_VALUE, Samples
-from pipeline.track import F8, U8, Quality
+from pipeline.track import F8, Quality
 
 Shape = Callable[[F8, F8], F8]
 
@@ -111,11 +112,6 @@ class Decay:
     chi2: float
 
     @property
-    def critical(self) -> bool:
-        """Whether the fit assumes critical damping."""
-        return self.values.size == 4
-
-    @property
     def rate(self) -> float:
         """The damping rate g, 1/s."""
         return math.exp(self.values[3])
@@ -123,7 +119,7 @@ class Decay:
     @property
     def stiffness(self) -> float:
         """The square w of the undamped angular frequency, rad^2/s^2."""
-        return self.rate**2 if self.critical else math.exp(self.values[4])
+        return self.rate**2 if self.values.size == 4 else math.exp(self.values[4])
 
     @property
     def square(self) -> float:
@@ -137,18 +133,14 @@ class Decay:
         return self.stiffness / (self.rate + math.sqrt(self.square)) if self.square > 0.0 else self.rate
 
 
-def best_decay(rows: Rows, rate_hz: float) -> Decay | None:
-    """Return the best of the fits from a grid of start values; None if no fit converged."""
-    ends = [DAMPED.fit(rows, start) for start in _grid(rows, rate_hz)]
+def best_decay(rows: Rows, starts: F8) -> Decay | None:
+    """Return the best of the fits from start values (k, 2), or (k, 1) with critical damping; None if none converged."""
     # If the record determines only one of two rates, chi-square has an open valley, possibly with a minimum beside it.
-    minima = [end for end in ends if end.converged]
-    return _described(DAMPED, rows, min(minima, key=lambda end: end.cost)) if minima else None
-
-
-def critical_decay(rows: Rows, near: Decay) -> Decay | None:
-    """Return the critically damped fit started from another fit; None if it did not converge."""
-    end = DAMPED.fit(rows, near.values[3:4])
-    return _described(DAMPED, rows, end) if end.converged else None
+    minima = [end for start in starts if (end := DAMPED.fit(rows, start)).converged]
+    if not minima:
+        return None
+    end = min(minima, key=lambda end: end.cost)
+    return Decay(end.values, covariance_of(rows.residuals(DAMPED)(end.values)[1]()), end.cost)
 
 
 def lone_exponential(rows: Rows, rate: float) -> tuple[float, float]:
@@ -158,10 +150,6 @@ def lone_exponential(rows: Rows, rate: float) -> tuple[float, float]:
     """
     end, most = LONE.fit(rows, np.array([math.log(rate)])), math.log(LARGEST_VALUE)
     return math.exp(min(max(float(end.values[-1]), -most), most)), end.cost
-
-
-def _described(model: Relaxing, rows: Rows, end: Fit) -> Decay:
-    return Decay(end.values, covariance_of(rows.residuals(model)(end.values)[1]()), end.cost)
 
 
 def _grid(rows: Rows, rate_hz: float) -> F8:
@@ -207,16 +195,10 @@ DECAY_PARAMETERS = ("rest", "displacement", "velocity", "log_rate", "log_stiffne
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Relaxation:
+class Relaxation(ClosedMotion):
     """A motion that relaxes with two rates or with one, or an oscillation whose damping ratio is large."""
 
-    kind: DampingKind
-    joint: Joint  # o, a, v, ln g and ln w, in the record's times and values
-    dof: float  # number of independent samples less that of the parameters
-    noise: Estimate  # of one sample, from the residual
-    start_s: float  # time at which the fitted part of the motion begins
-    residual: F8  # (n,) what the motion leaves of every sample, NaN before the start
-    flags: U8  # (n,) with those before the start as outside
+    kind: DampingKind  # the parameters are o, a, v, ln g and ln w
 
     def position(self, t: F8) -> F8:
         """Return the values (n,) at times t (n,) from the start on."""
@@ -282,7 +264,7 @@ def _starts(y: F8, noise: float) -> Iterator[int]:
 def _follow(t: F8, y: F8, noise: float, samples: Samples) -> Relaxation | Refusal:
     every = np.ones(t.size, np.bool_)
     rows, track = Rows(t - t[0], y, every, every, noise), samples.track
-    found = best_decay(rows, track.rate_hz)
+    found = best_decay(rows, _grid(rows, track.rate_hz))
     if found is None or not found.rate * rows.t[-1] > 2.0 or _misses(rows, found):
         return NO_RELAXATION
     choice = _kind(rows, found, 0.5 * track.rate_hz)
@@ -337,7 +319,7 @@ def _kind(rows: Rows, fit: Decay, fastest: float) -> tuple[DampingKind, Decay] |
     """
     price = math.log(rows.t.size)
     rate, left = lone_exponential(rows, fit.slowest)
-    one = critical_decay(rows, fit)
+    one = best_decay(rows, fit.values[None, 3:4])
     critical = math.inf if one is None else one.chi2 + 4.0 * price
     free = fit.chi2 + 5.0 * price
     if min(critical, free) > left + 3.0 * price - STRONG:

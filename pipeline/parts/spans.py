@@ -12,6 +12,7 @@ import math
 import sys
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,8 +137,7 @@ def free_span(samples: Samples, windows: Windows) -> Partition | None:
     return _chosen(series, series.parts(), samples)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _WindowSpan:
+class _WindowSpan(NamedTuple):
     """Windows first to stop - 1: all still, or moving without a jump."""
 
     first: int

@@ -6,8 +6,8 @@ import math
 from typing import Any
 
 from pipeline.motion.at_rest import Rest
+from pipeline.motion.lines import TwoModes
 from pipeline.motion.relaxation import Relaxation
-from pipeline.motion.two_modes import TwoModes
 
 
 def closed_form(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -25,8 +25,8 @@ from pipeline.damping.select import Damping
 from pipeline.motion.at_rest import Rest
 from pipeline.motion.fitted import Oscillation, Phase
 from pipeline.motion.kinds import Motion
+from pipeline.motion.lines import TwoModes
 from pipeline.motion.relaxation import Relaxation
-from pipeline.motion.two_modes import TwoModes
 from pipeline.numerics.estimate import Estimate, Joint, UpperLimit
 from pipeline.numerics.levels import LIMIT
 from pipeline.numerics.robust import U_OF_MAD, mad_sigma
@@ -50,28 +50,28 @@ class Derived:
 
     # Estimates with all known contributions to the uncertainty, including clock and scale.
     estimates: Mapping[str, Estimate]
+    budgets: Mapping[str, Budget]  # contributions of the inputs to every estimate and coefficient
+    scales: tuple[Any, Any]  # variables: the factors that convert rates and lengths of the record to true s and m
     # Coefficients of one law, with all known contributions; coefficients that are not determined are upper limits. The
     # law is the stated one if there is one, or the only admissible one. Otherwise it is linear and quadratic drag
     # together if the record allows it, or the selected law.
-    coefficients: Mapping[str, Estimate]
-    budgets: Mapping[str, Budget]  # contributions of the inputs to every estimate and coefficient
-    # The laws over which amplitude and damping rate are averaged.
-    laws: tuple[Weighted, ...]
+    coefficients: Mapping[str, Estimate] = field(default_factory=dict)
+    laws: tuple[Weighted, ...] = ()  # over which amplitude and damping rate are averaged
     # Name of the law by which the results are stated; empty if they are an average over laws. They count as an average
     # also if the record selects one drag and the results use both, of which it is a special case.
-    law: str
-    law_of_coefficients: str  # name of the law of ``coefficients``
+    law: str = ""
+    law_of_coefficients: str = ""  # name of the law of ``coefficients``
     # Whether the coefficients may be quoted: their law is stated, the only one that the record admits, or if it admits
     # none, far nearer than the others.
-    quoted: bool
-    scales: tuple[Any, Any]  # variables: the factors that convert rates and lengths of the record to true s and m
-    effective_mass_kg: Estimate | None  # bob, and the air and the share of the spring that the effects table includes
-    own_mass_kg: Estimate | None  # the same without the spring
+    quoted: bool = False
+    # Bob, and the air and the share of the spring that the effects table includes, and the same without the spring.
+    effective_mass_kg: Estimate | None = None
+    own_mass_kg: Estimate | None = None
     # Mechanical energy over the squared recorded amplitude, N/m for a length; per kilogram if no mass is known.
-    half_stiffness: Estimate | None
+    half_stiffness: Estimate | None = None
     # Displacement over the recorded value: 1 for a length, in s for a velocity, in s^2 for an acceleration.
-    displacement: Estimate | None
-    drag_length: Estimate | None  # drag coefficient over :math:`-\\dot A/A^2` of the recorded amplitude
+    displacement: Estimate | None = None
+    drag_length: Estimate | None = None  # drag coefficient over :math:`-\\dot A/A^2` of the recorded amplitude
 
     @cached_property
     def of_law(self) -> frozenset[str]:
@@ -128,37 +128,42 @@ def derive(
     Results that depend on the damping law are averages over laws (:func:`pipeline.damping.average.average_over_laws`):
     :math:`x = \\sum_i w_i x_i` and :math:`u^2 = \\sum_i w_i (u_i^2 + (x_i - x)^2)`.
     """
-    inputs, unit = Inputs(), track.unit
+    inputs, instrument = Inputs(), Instrument.of(track)
     if not isinstance(motion, Oscillation):
-        return _closed(track, motion, scene, inputs)
-    fitted = motion
-    laws = _Laws(fitted.damping, inputs, fitted.windows)
+        of_scene = _of_scene(track, scene, {"added_mass", "spring_mass"}, inputs)
+        every = _closed(motion, instrument, of_scene, inputs, track.unit)
+        return _derived(every, inputs, track.unit)
+    laws = _Laws(motion.damping, inputs, motion.windows)
     of_scene = _of_scene(track, scene, {effect.name for effect in effects if effect.included}, inputs)
-    every = solve(of_scene | _of_motion(track, fitted, misfits, laws, inputs))
-    coefficients = every.get("coefficients", {})
-    found = {name: (every[name], _unit_of(name, unit)) for name in QUANTITIES if name in every}
-    parts = {
-        name: Estimate.of_variable(every[name], _unit_of(name, unit)) if name in every else None for name in _PARTS
-    }
-    budgets = {name: inputs.budget(name, x, own) for name, (x, own) in (found | coefficients).items()}
-    law = laws.stated.name if len(laws.weighted) == 1 and laws.stated.name == fitted.damping.selected else ""
-    return Derived(
-        estimates={name: budgets[name].estimate for name in found},
-        coefficients={name: limited(laws.shown.law, name, budgets[name].estimate) for name in coefficients},
-        budgets=budgets,
+    every = solve(of_scene | _of_motion(track, motion, misfits, laws, inputs))
+    derived, alone = _derived(every, inputs, track.unit), len(laws.weighted) == 1
+    shown = {name: derived.budgets[name].estimate for name in every.get("coefficients", {})}
+    return replace(
+        derived,
+        coefficients={name: limited(laws.shown.law, name, estimate) for name, estimate in shown.items()},
         laws=laws.weighted,
-        law=law,
+        law=laws.stated.name if alone and laws.stated.name == motion.damping.selected else "",
         law_of_coefficients=laws.shown.name,
         quoted=laws.quoted,
-        scales=(every["rates"], every["lengths"]),
-        **parts,
     )
 
 
-def _closed(track: Track, motion: Relaxation | TwoModes | Rest, scene: Scene, inputs: Inputs) -> Derived:
+def _derived(every: Mapping[str, Any], inputs: Inputs, unit: str) -> Derived:
+    """Return all results with their budgets."""
+    found = {name: (every[name], _unit_of(name, unit)) for name in QUANTITIES if name in every}
+    budgets = {n: inputs.budget(n, x, own) for n, (x, own) in (found | every.get("coefficients", {})).items()}
+    return Derived(
+        estimates={name: budgets[name].estimate for name in found},
+        budgets=budgets,
+        scales=(every["rates"], every["lengths"]),
+        **{name: Estimate.of_variable(every[name], _unit_of(name, unit)) for name in _PARTS if name in every},
+    )
+
+
+def _closed(
+    motion: Relaxation | TwoModes | Rest, instrument: Instrument, of_scene: dict[str, Any], inputs: Inputs, unit: str
+) -> dict[str, Any]:
     """Return the results of a motion without laws, with the clock, scale and zero of the instrument."""
-    instrument, unit = Instrument.of(track), track.unit
-    of_scene = _of_scene(track, scene, {"added_mass", "spring_mass"}, inputs)
     rate, scale = inputs.add("clock_rate", instrument.clock_rate, "B"), of_scene["distance_scale"]
     x = dict(zip(motion.joint.names, inputs.add_joint("fitted_motion", motion.joint, motion.dof), strict=True))
     known = {
@@ -169,24 +174,7 @@ def _closed(track: Track, motion: Relaxation | TwoModes | Rest, scene: Scene, in
         "noise_of_samples": inputs.add("noise", motion.noise, "A", motion.dof),
     }
     of_motion, results = closed_form(motion, x, rate=rate, scale=scale)
-    every = solve(of_scene | known | of_motion)
-    every |= results
-    found = {name: every[name] for name in QUANTITIES if name in every}
-    budgets = {name: inputs.budget(name, value, _unit_of(name, unit)) for name, value in found.items()}
-    parts = {
-        name: Estimate.of_variable(every[name], _unit_of(name, unit)) if name in every else None for name in _PARTS
-    }
-    return Derived(
-        estimates={name: budget.estimate for name, budget in budgets.items()},
-        coefficients={},
-        budgets=budgets,
-        laws=(),
-        law="",
-        law_of_coefficients="",
-        quoted=False,
-        scales=(rate, scale),
-        **parts,
-    )
+    return solve(of_scene | known | of_motion) | results | {"rates": rate, "lengths": scale}
 
 
 def limited(law: Law, name: str, estimate: Estimate) -> Estimate:

@@ -67,9 +67,7 @@ class Samples:
     # Resolution of the distances: the track's, or a coarser one that the distances themselves show.
     quantum: float | None
     clipped_from: tuple[float, ...] = ()  # for each plateau, the distance beyond which samples were flagged
-    clippings: tuple[
-        Clipping, ...
-    ] = ()  # found by the sinusoid, which replace the plateaus; see pipeline.parts.clipping
+    clippings: tuple[Clipping, ...] = ()  # found by the sinusoid (pipeline.parts.clipping), which replace the plateaus
 
     @property
     def used(self) -> NDArray[np.bool_]:

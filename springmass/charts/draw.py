@@ -184,10 +184,12 @@ def draw(panel: Panel, ax: Axes) -> Axes:
 
 
 def _logarithmic(axis: Axis, ratio: float) -> None:
-    """Write plain numbers at powers of ten of a logarithmic axis, and at 2 and 5 if it spans less than two."""
+    """Write plain numbers at powers of ten of a logarithmic axis, and at more places if it spans less than two."""
     from matplotlib.ticker import LogLocator, NullFormatter
 
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if ratio < 100.0 else (1.0,)))
+    axis.set_major_locator(
+        LogLocator(subs=(1.0, 2.0, 3.0, 5.0, 7.0) if ratio < 6.0 else (1.0, 2.0, 5.0) if ratio < 100.0 else (1.0,))
+    )
     axis.set_major_formatter("{x:g}")
     axis.set_minor_formatter(NullFormatter())
 

@@ -9,8 +9,8 @@ LOOKS: dict[str, dict[str, Any]] = {
     "data": {"light": ["#0063a0"], "dark": ["#6cb8f0"], "dash": [[]], "marker": "dot"},
     "law": {"light": ["#1d232a"], "dark": ["#e4e8ec"], "dash": [[]], "marker": "dot"},
     "other": {
-        "light": ["#00704f", "#a03f78", "#7d5f00", "#2a6f97"],
-        "dark": ["#4fd1a5", "#e8a0c8", "#f0c04a", "#9ad5f5"],
+        "light": ["#00704f", "#a03f78", "#7d5f00", "#2a6f97", "#5b3cc4", "#9c3a1c", "#4a6b00", "#4d4d4d"],
+        "dark": ["#4fd1a5", "#e8a0c8", "#f0c04a", "#9ad5f5", "#b9a5ff", "#ff9f80", "#b5d96b", "#c9c9c9"],
         "dash": [[8, 4], [2, 3], [10, 3, 2, 3], [4, 2, 4, 6]],
         "marker": "ring",
     },

@@ -410,7 +410,7 @@ def classic_method(a: Analysis, classic: Classic) -> Chart | None:
     above = Panel(value_label("position", a.track.unit), picks, x_label="time of the picked maxima / s")
     every = slice(None, None, classic.window_t.size // MOST_SLIDING + 1)
     times, amplitudes = classic.window_t[every], factor * classic.window_amplitude[every]
-    sliding = line_of("half the range in 1.5 s", times, amplitudes, "rest")
+    sliding = line_of("half the range in 1.5 s", times, amplitudes, "other")
     fitted = line_of("its exponential", times, factor * classic.exponential()[every], "other")
     both = np.concatenate([sliding.y, fitted.y])
     ends = (float(np.min(both)), 1.05 * float(np.max(both)))

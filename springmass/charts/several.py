@@ -19,6 +19,8 @@ from springmass.charts.chart import Chart, Panel, Series, band_of, line_of, valu
 from springmass.charts.run import DETAIL_PERIODS, used_samples
 from springmass.typeset import prefixed, pretty
 
+MOST_OVERLAID = 8  # runs: as many as there are colours of other lines
+
 
 def overlay(names: Sequence[str], analyses: Sequence[Analysis]) -> Chart | None:
     """Displacements of several runs against the time since each first used sample; None for different units."""
@@ -26,7 +28,7 @@ def overlay(names: Sequence[str], analyses: Sequence[Analysis]) -> Chart | None:
     if any(a.track.unit != unit for a in analyses):
         return None
     series, fastest = [], 0.0
-    for name, a in zip(names, analyses, strict=True):
+    for name, a in list(zip(names, analyses, strict=True))[:MOST_OVERLAID]:
         used = used_samples(a)
         if not used.any():
             continue
@@ -37,7 +39,8 @@ def overlay(names: Sequence[str], analyses: Sequence[Analysis]) -> Chart | None:
         series.append(line_of(visible(name), t - t[0], (y - rest) * RECORDED_UNITS[unit].factor, "other"))
     what = "displacement" if unit == "m" else f"{noun(unit)} from rest"
     panel = Panel(value_label(what, unit), tuple(series), x_label="time since the first sample used / s")
-    caption = "Displacement of every run from its rest position."
+    which = "every run" if len(names) <= MOST_OVERLAID else f"the first {MOST_OVERLAID} of {len(names)} runs"
+    caption = f"Displacement of {which} from its rest position."
     return Chart("overlay", "Positions", caption, (panel,), DETAIL_PERIODS / fastest if fastest else None)
 
 
@@ -245,7 +248,8 @@ def drag_map(runs: Sequence[tuple[str, F8]]) -> Chart | None:
             series.append(line_of("oscillating disc, as simulate assumes", grid, assumed, "rest"))
         series.append(line_of(words, grid, line))
         low, high = np.nanquantile(np.concatenate(heights), (0.01, 0.99)).tolist()
-        shown = (0.7 * min(low, float(line.min())), 1.4 * max(high, STEADY_DISC_DRAG))
+        least = float(line.min())
+        shown = (0.7 * min(low, least), 1.4 * max(high, STEADY_DISC_DRAG, least))
         panels.append(Panel("effective drag coefficient", tuple(series), 3.6, label, log=True, log_x=True, range=shown))
     caption = (
         "Effective drag coefficient of every run from its first to its last amplitude, with bands of u. It counts all "

@@ -12,6 +12,7 @@ from typing import Any
 
 from acquisition.decoders.registry import get_family
 from acquisition.errors import FormatError, NeedsAnswer, SensorError
+from acquisition.live.clock_fit import facts_of
 from acquisition.live.line_times import settled
 from acquisition.recordings.identify import open_recording
 from acquisition.recordings.questions import Missing, MissingItem, Question
@@ -144,7 +145,7 @@ def _with_line_times(recording: Recording, provenance: Mapping[str, Any]) -> tup
     if polled:
         return recording, provenance
     samples, lines = settled(recording.samples)
-    decoding = {**decoding, "clock": {**clock, "lines": lines.to_mapping()}}
+    decoding = {**decoding, "clock": {**clock, "lines": facts_of(lines)}}
     recording = replace(recording, samples=samples, info=lines.described(recording.info))
     return recording, {**provenance, "decoding": decoding}
 

@@ -11,7 +11,7 @@ from acquisition.block import Block, SourceInfo
 from acquisition.decoders.sensor import RESONATOR_PPM
 from acquisition.events import Triggered, recorded_events
 from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S, Calibration
-from acquisition.live.clock_fit import fit_clock
+from acquisition.live.clock_fit import facts_of, fit_clock
 from pipeline.track import Track
 
 MOTION_SENSOR = "motion-sensor"  # family that assumes a fixed speed of sound
@@ -56,7 +56,7 @@ def _clock_comparison(samples: Block, info: SourceInfo, provenance: Mapping[str,
     if noted.keys() >= COMPARED:
         comparison = noted  # by the pings, whose times are in no sample; files of earlier versions may lack it
     elif samples.host_ns is not None and (samples.host_ns >= 0).all():
-        comparison = fit_clock(samples.t, samples.host_ns).to_mapping()
+        comparison = facts_of(fit_clock(samples.t, samples.host_ns))
     else:
         return {}
     clock = {

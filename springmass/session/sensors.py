@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from acquisition.decoders.decoder import Identity
@@ -76,7 +76,7 @@ class OpenSensor:
             self.rate_hz,
             {**dict.fromkeys(self.family.past_defaults, "auto"), **self.options},
             self.clock_ppm,
-            calibration=dict(self.calibration.to_mapping()),
+            calibration=asdict(self.calibration),
         )
 
     def not_heard(self, heard: bytes) -> ProgramError:

@@ -148,9 +148,9 @@ class LogSurvey:
 
     def provenance(self, origin_ns: int) -> dict[str, Any]:
         """Return marks and events as plain numbers and texts, with their times relative to ``origin_ns``."""
-        by_kind: dict[RecordKind, list[dict[str, Any]]] = {RecordKind.MARK: [], RecordKind.EVENT: []}
+        provenance: dict[str, Any] = {"marks": [], "events": []}
         for kind, mono_ns, channel, _, content, _ in self._notes:
+            of_kind = provenance["marks" if kind is RecordKind.MARK else "events"]
             t_s = (mono_ns - origin_ns) * 1e-9
-            by_kind[kind].append({"mono_ns": mono_ns, "t_s": t_s, "channel": channel, **content})
-        provenance: dict[str, Any] = {"marks": by_kind[RecordKind.MARK], "events": by_kind[RecordKind.EVENT]}
+            of_kind.append({"mono_ns": mono_ns, "t_s": t_s, "channel": channel, **content})
         return provenance | ({"notes_left_out": self._left_out} if self._left_out else {})

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -77,22 +75,6 @@ def test_a_report_is_written_where_it_is_wanted(tmp_path: Path, cli: Cli) -> Non
     page = (out / "report.html").read_text("utf-8")
     assert "damped_simulated_position" in page
     assert 'id="figure-comparison' in page
-
-
-@pytest.mark.trials
-@pytest.mark.skipif(shutil.which("pdflatex") is None, reason="no LaTeX; Debian: apt-get install texlive-science")
-def test_latex_compiles_the_lab_report_of_a_pair_and_its_tables(tmp_path: Path, cli: Cli) -> None:
-    """No line is too wide, neither in the report nor in the text width of article; each cited figure is there."""
-    assert cli("compare", *RIGHT, *FAST, "-o", tmp_path / "out", "--template", "latex").code == 0
-    tables = tmp_path / "out" / "tables.tex"
-    packages = r"\documentclass{article}\usepackage{booktabs,longtable,siunitx}\begin{document}"
-    tables.write_text(rf"{packages}\input{{table.tex}}\input{{budget.tex}}\end{{document}}")
-    for document in ("lab-report.tex", tables.name):
-        call = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", document]
-        for _ in range(2):
-            done = subprocess.run(call, cwd=tables.parent, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stdout
-        assert [line for line in done.stdout.splitlines() if "Overfull" in line or "undefined" in line] == []
 
 
 def test_a_run_that_does_not_oscillate_cannot_be_compared(tmp_path: Path, cli: Cli) -> None:

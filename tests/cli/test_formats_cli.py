@@ -19,7 +19,7 @@ def write_log(path: Path, channels: int) -> None:
     with Recorder(path, LogHeader(sensors=sensors, mono_ns=0, unix_ns=0), VirtualClock()) as recorder:
         for i in range(200):
             for channel in range(channels):
-                recorder.put(channel, 100_000_000 * (i + 1), b"R%04d\r" % (1000 + i % 50))
+                recorder.reads([(channel, 100_000_000 * (i + 1), b"R%04d\r" % (1000 + i % 50))])
 
 
 def facts_of(out: str) -> dict[str, str]:

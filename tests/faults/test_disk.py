@@ -54,7 +54,7 @@ def test_a_log_at_the_file_size_limit_becomes_its_run_file(tmp_path: Path) -> No
     with files_up_to(LIMIT):
         recorder = Recorder(log, HEADER, SystemClock(), sync_every_s=0.003)
         while not recorder.status.error:
-            recorder.put(0, number * 100_000_000, b"R%04d\r" % (number % 5000))
+            recorder.reads([(0, number * 100_000_000, b"R%04d\r" % (number % 5000))])
             number += 1
             recorder.drain()
         with pytest.raises(WriteFailed) as caught:
@@ -79,7 +79,7 @@ def test_short_writes_and_a_full_disk_keep_what_was_committed(seed: int, tmp_pat
     room = int(rng.integers(1000, 12_000))
     recorder = Recorder(log, HEADER, VirtualClock(), open_file=lambda path: Faulty(path, rng, room), sync_every_s=0.001)
     for number in range(500):
-        recorder.put(0, number, b"R%04d\r" % number)
+        recorder.reads([(0, number, b"R%04d\r" % number)])
     status = recorder.drain()
     with pytest.raises(WriteFailed) as caught:
         recorder.close()

@@ -137,7 +137,7 @@ def test_what_did_not_fit_is_a_gap_with_its_time_and_length(tmp_path: Path, caps
             if number == 100:
                 recorder.drain()
                 disk.writes_pass.clear()
-            recorder.put(0, SECOND_NS * number // 10, swinging(number))
+            recorder.reads([(0, SECOND_NS * number // 10, swinging(number))])
             if number == 100:
                 assert disk.held.wait(WAIT_S)
             if number == 249:

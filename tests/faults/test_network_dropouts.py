@@ -118,7 +118,7 @@ def deliver(plan: Plan, recorder: Recorder, rng: np.random.Generator) -> None:
             data += b"" if lost[there] else sent[there]
             there += 1
         if data:
-            recorder.put(0, START_NS + round(arrival[here] * 1e9), data)
+            recorder.reads([(0, START_NS + round(arrival[here] * 1e9), data)])
         here = there
 
 

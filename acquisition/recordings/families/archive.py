@@ -18,11 +18,10 @@ from acquisition.recordings.identify import foreign_format, formats
 from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.tables.format import ColumnFormat
 from acquisition.recordings.tables.table import Table
-from acquisition.recordings.tables.text import HEAD_BYTES
+from acquisition.recordings.tables.text import HEAD_BYTES, ZIP_MAGIC
 
 MOST_UNPACKED_BYTES = 1 << 28
 """Maximum unpacked size of all parts of a file, bytes; one hour of a phone's sensor data takes a tenth of it."""
-_MAGIC = b"PK\x03\x04"
 NOT_INSIDE = ("motion-sensor", "workbook", "zip")  # the first sums velocities only in a file of its own
 _MOST_MEMBERS = 2000
 _DAMAGE = (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, OSError, ValueError)
@@ -100,6 +99,11 @@ def members(path: str, data: bytes) -> Iterator[tuple[str, bytes]]:
         raise foreign_format(path, b"") or unread from error
 
 
+def is_one_recording(data: bytes) -> bool:
+    """Return whether the files of an archive belong together; phyphox packs its sensors with a file about the phone."""
+    return b"meta/device.csv" in data
+
+
 def _is_wanted(file: zipfile.ZipInfo) -> bool:
     """Return whether a file is none that an operating system adds."""
     if not file.filename:
@@ -115,7 +119,7 @@ def _evidence(head: bytes) -> str:
         or b".npy" in head[30:128]
         or b"application/vnd.oasis" in head[:200]
     )
-    return "it begins with the bytes of a zip archive" if head.startswith(_MAGIC) and not others else ""
+    return "it begins with the bytes of a zip archive" if head.startswith(ZIP_MAGIC) and not others else ""
 
 
 FORMAT = ColumnFormat(

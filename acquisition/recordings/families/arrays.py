@@ -20,19 +20,20 @@ from acquisition.recordings.tables.format import ColumnFormat
 from acquisition.recordings.tables.headings import Heading, heading_of, is_time
 from acquisition.recordings.tables.layout import times_by_name, times_by_steps
 from acquisition.recordings.tables.table import Column, Header, Table, side_by_side
+from acquisition.recordings.tables.text import ZIP_MAGIC
 from acquisition.units import time_unit
 
 MOST_ARRAY_BYTES = 1 << 28
 """Maximum size of all arrays of a file, bytes."""
 _FEWEST, _MOST_COLUMNS = 3, 32
-_ZIP, _HDF5 = b"PK\x03\x04", b"\x89HDF\r\n\x1a\n"
+_HDF5 = b"\x89HDF\r\n\x1a\n"
 _REMEDY = "save times and values as CSV"
 NamedArray = tuple[str, str, Any]
 """Name, unit and values."""
 
 
 def _evidence(head: bytes) -> str:
-    if head.startswith(b"\x93NUMPY") or (head.startswith(_ZIP) and head[30:128].partition(b".npy")[1]):
+    if head.startswith(b"\x93NUMPY") or (head.startswith(ZIP_MAGIC) and head[30:128].partition(b".npy")[1]):
         return "it begins with the bytes of numpy's files"
     if head.startswith((b"MATLAB 5.0 MAT", b"MATLAB 7.3 MAT")):
         return "it begins with the bytes of a MATLAB file"
@@ -41,8 +42,8 @@ def _evidence(head: bytes) -> str:
 
 def _arrays(data: bytes) -> Iterator[NamedArray]:
     file = io.BytesIO(data)
-    if data.startswith((b"\x93NUMPY", _ZIP)):
-        if data.startswith(_ZIP):
+    if data.startswith((b"\x93NUMPY", ZIP_MAGIC)):
+        if data.startswith(ZIP_MAGIC):
             _limit(sum(each.file_size for each in zipfile.ZipFile(file).infolist()))
         read = np.load(file, allow_pickle=False)
         for name, array in [("", read)] if isinstance(read, np.ndarray) else read.items():
@@ -80,11 +81,13 @@ def _of_hdf5(file: io.BytesIO) -> Iterator[NamedArray]:
     import h5py
 
     with h5py.File(file) as opened:
-        found: list[Any] = []
-        opened.visititems(lambda _, item: found.append(item) if isinstance(item, h5py.Dataset) else None)
-        kept = [each for each in found if each.dtype.kind in "iuf" and 0 < each.ndim <= 2 and "#refs#" not in each.name]
-        _limit(sum(each.size * each.dtype.itemsize for each in kept))
-        for each in kept:
+        datasets: list[Any] = []
+        opened.visititems(lambda _, item: datasets.append(item) if isinstance(item, h5py.Dataset) else None)
+        numeric = [
+            each for each in datasets if each.dtype.kind in "iuf" and 0 < each.ndim <= 2 and "#refs#" not in each.name
+        ]
+        _limit(sum(each.size * each.dtype.itemsize for each in numeric))
+        for each in numeric:
             unit, fill = each.attrs.get("units", ""), each.attrs.get("_FillValue")
             values = each[...].astype(np.float64)
             if fill is not None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import takewhile
 
 from acquisition.recordings.sampling.timing import Formula
 from acquisition.recordings.tables.format import text_format
@@ -28,10 +29,10 @@ def labchart(lines: Sequence[str]) -> Header | None:
     """Read the lines above a block."""
     if not lines[0].startswith("Interval="):
         return None
-    above = [line.split("\t") for line in lines[: next((at for at, each in enumerate(lines) if "=" not in each), 0)]]
-    said = {cells[0].rstrip("= "): [cell.strip() for cell in cells[1:]] for cells in above}
-    titles, units = said.get("ChannelTitle", []), said.get("UnitName", [])
-    step = duration_s(" ".join(said["Interval"]))
+    above = [line.split("\t") for line in takewhile(lambda line: "=" in line, lines)]
+    settings = {cells[0].rstrip("= "): [cell.strip() for cell in cells[1:]] for cells in above}
+    titles, units = settings.get("ChannelTitle", []), settings.get("UnitName", [])
+    step = duration_s(" ".join(settings.get("Interval", [])))
     if not titles or step is None or len(above) >= len(lines):
         return None
     channels = [Heading(title, unit) for title, unit in zip(titles, [*units, *[""] * len(titles)], strict=False)]

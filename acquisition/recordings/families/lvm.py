@@ -50,14 +50,13 @@ class _Header:
     cells: Mapping[str, list[str]]
     next: int
 
-    def first_of(self, key: str) -> str:
-        """Return the first non-empty cell of a key."""
-        return next((cell for cell in self.cells.get(key, ()) if cell), "")
-
     def of_column(self, key: str, column: int) -> str:
-        """Return the cell of a key that belongs to a column of the rows."""
-        cells = self.cells.get(key, [])
-        return cells[column - 1] if 0 < column <= len(cells) else ""
+        """Return the cell of a key that belongs to a column of the rows, counted from 1; empty if there is none."""
+        return "".join(self.cells.get(key, [])[column - 1 : column])
+
+    def get(self, key: str, column: int = 1) -> str:
+        """Return the cell of a key that belongs to a column, or else the first that is not empty."""
+        return self.of_column(key, column) or next(filter(None, self.cells.get(key, ())), "")
 
 
 def _evidence(head: bytes) -> str:
@@ -84,7 +83,7 @@ def _tables(path: str, data: bytes) -> list[Table]:
     tables = [*_joined(passes), *(each for of_pass in passes for each in of_pass)]
     if not tables:
         raise FormatError(path, "expected channels below the header, got none", "export the run again")
-    title = segments[0][0].first_of("Notes") or top.first_of("Description")
+    title = segments[0][0].get("Notes") or top.get("Description")
     return [replace(each, title=title) for each in tables]
 
 
@@ -130,10 +129,10 @@ def _of_segment(
     none = Column("", "", np.empty(0), np.empty(0, np.int8))
     read = [*table.columns, *[none] * (len(cells) - len(table.columns))]
     beside = tuple(replace(column, name=name) for name, column in zip(cells, read, strict=False))
-    mode = (top.first_of("X_Columns") or "One").lower()
+    mode = (top.get("X_Columns") or "One").lower()
     for at in range(1, len(cells), 2 if mode == "multi" else 1):
         name, unit = _name_and_unit(cells[at], segment.of_column("Y_Unit_Label", at), at)
-        timed = (segment.of_column("X_Dimension", at) or segment.first_of("X_Dimension") or "Time") == "Time"
+        timed = (segment.get("X_Dimension", at) or "Time") == "Time"
         time = None if mode == "no" or not timed else beside[at - 1 if mode == "multi" else 0]
         aside = segment.of_column("Samples", at) == "0"
         yield replace(
@@ -209,9 +208,7 @@ def _name_and_unit(label: str, unit: str, column: int) -> tuple[str, str]:
 
 
 def _formula(segment: _Header, column: int) -> Formula | None:
-    start, step, samples = (
-        parse_number(segment.of_column(key, column) or segment.first_of(key)) for key in ("X0", "Delta_X", "Samples")
-    )
+    start, step, samples = (parse_number(segment.get(key, column)) for key in ("X0", "Delta_X", "Samples"))
     if step is None:
         return None
     count = None if samples is None or not 0 <= samples < 2**53 else int(samples)
@@ -219,7 +216,7 @@ def _formula(segment: _Header, column: int) -> Formula | None:
 
 
 def _start_time(segment: _Header, column: int) -> str:
-    date, time = (segment.of_column(key, column) or segment.first_of(key) for key in ("Date", "Time"))
+    date, time = (segment.get(key, column) for key in ("Date", "Time"))
     day = re.fullmatch(r"(\d{4})/(\d\d)/(\d\d)", date, re.ASCII)
     if day is None or int(day[1]) <= 1904:
         return ""

@@ -13,7 +13,7 @@ the column line may have been edited or deleted; then the shape of the rows deci
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -113,14 +113,12 @@ class MotionSensor(ColumnFormat):
         except NeedsAnswer:
             return ()
         column, rate_hz = samples.column, samples.timing.rate_hz
-        return (Survey("", column.name, column.unit, samples.t.size, rate_hz, samples.traps),)
+        return (Survey("", column.name, column.unit, len(samples.block), rate_hz, samples.traps),)
 
     def read(self, path: str, data: bytes, reading: ReadOptions = READ_DEFAULTS) -> Recording:
         """Read one file, either of position or of velocity; see :class:`springmass.extend.Format`."""
         samples = self._samples(path, data, reading)
-        if samples.column.differences:
-            return samples.recording(self.name, data, *_summed_up(samples))
-        return samples.recording(self.name, data, Block(0, samples.t, samples.value, samples.flags))
+        return (_summed_up(samples) if samples.column.differences else samples).recording(self.name, data)
 
     def read_pair(
         self, position: tuple[str, bytes], velocity: tuple[str, bytes], reading: ReadOptions = READ_DEFAULTS
@@ -131,7 +129,7 @@ class MotionSensor(ColumnFormat):
         if p.column.name == v.column.name:
             problem = f"expected a position and a velocity file, got {p.column.name} in both ({p.name} too)"
             raise FormatError(v.path, problem, "name the other file of the pair")
-        joined = p.recording(self.name, position_data, *_joined(p, v))
+        joined = _joined(p, v).recording(self.name, position_data)
         unread = joined.malformed_rows + int(np.count_nonzero(~v.sound))
         return replace(joined, malformed_rows=unread, originals=(*joined.originals, Original(v.name, velocity_data)))
 
@@ -156,45 +154,47 @@ _TEXT = text_format("motion-sensor", "MotionSensor.vi text: position, velocity, 
 FORMAT = MotionSensor(_TEXT.name, _TEXT.title, _TEXT.evidence, _tables)
 
 
-def _summed_up(samples: Samples) -> tuple[Block, Iterable[FormatIssue]]:
+def _summed_up(samples: Samples) -> Samples:
     """Integrate velocity to position; the first sample is at zero, because the file does not contain the offset."""
-    value, rate_hz, flags = samples.value, samples.timing.rate_hz, samples.flags.copy()
+    t, value, flags, rate_hz = samples.block.t, samples.block.distance, samples.block.flags, samples.timing.rate_hz
     regular = np.flatnonzero((flags & IRREGULAR) == 0)
-    index = np.rint(samples.t[regular] * rate_hz).astype(np.int64)
+    index = np.rint(t[regular] * rate_hz).astype(np.int64)
     position, bridged = _integrate(value[regular], index, rate_hz)
-    distance = np.full(samples.t.size, np.nan)
+    distance = np.full(t.size, np.nan)
     distance[regular] = position
     flags[regular[bridged]] |= Flag.GAP_BEFORE.value
     flags[np.isnan(distance)] |= Flag.MISSING.value
     summed = "the position was integrated from the velocity: its offset is unknown, and the first sample is at 0 m"
-    traps = [FormatIssue("offset_unknown", summed, samples.t.size)]
+    traps = [FormatIssue("offset_unknown", summed, t.size)]
     if holes := int(np.count_nonzero(bridged)):
-        first = float(samples.t[regular[bridged]][0])
+        first = float(t[regular[bridged]][0])
         gaps = f"{holes} gap{'s' if holes > 1 else ''}, the first before t = {first:g} s"
         message = f"the velocity has {gaps}: the integrated position may jump there"
         traps.append(FormatIssue("offset_unknown_after_gap", message, holes))
-    return Block(0, samples.t, distance, flags, None, value), traps
+    return replace(samples, block=Block(0, t, distance, flags, None, value), traps=(*samples.traps, *traps))
 
 
-def _joined(p: Samples, v: Samples) -> tuple[Block, Iterable[FormatIssue]]:
+def _joined(p: Samples, v: Samples) -> Samples:
     """Join positions and velocities by their times."""
     rate_hz = p.timing.rate_hz
     if abs(v.timing.rate_hz - rate_hz) > 1e-6 * rate_hz:
         problem = f"expected {rate_hz:g} Hz as in {p.name}, got {v.timing.rate_hz:g} Hz"
         raise FormatError(v.path, problem, "name the velocity file of the same run")
     resolution = min(p.timing.resolution_s, v.timing.resolution_s)
-    keys = [np.rint(t / resolution).astype(np.int64) for t in (p.t, v.t)]
-    from_p, from_v = _outer_join(keys[0], keys[1], (p.flags & IRREGULAR) == 0)
+    keys = [np.rint(t / resolution).astype(np.int64) for t in (p.block.t, v.block.t)]
+    from_p, from_v = _outer_join(keys[0], keys[1], (p.block.flags & IRREGULAR) == 0)
     in_p, in_v = from_p >= 0, from_v >= 0
     if not (in_p & in_v).any():
         problem = f"expected times in common with {p.name}, got none"
         raise FormatError(v.path, problem, "name the velocity file of the same run")
-    t = np.where(in_p, p.t[from_p], v.t[from_v])
-    distance, speed = np.where(in_p, p.value[from_p], np.nan), np.where(in_v, v.value[from_v], np.nan)
+    t = np.where(in_p, p.block.t[from_p], v.block.t[from_v])
+    distance = np.where(in_p, p.block.distance[from_p], np.nan)
+    speed = np.where(in_v, v.block.distance[from_v], np.nan)
     flags = time_flags(t, 1.0 / rate_hz)
-    flags |= np.where(in_p, p.flags[from_p], v.flags[from_v]) & UNREAD_FLAGS
+    flags |= np.where(in_p, p.block.flags[from_p], v.block.flags[from_v]) & UNREAD_FLAGS
     flags[~in_p] |= Flag.MISSING.value
-    return Block(0, t, distance, flags, None, speed), _join_traps(p, v, from_p, from_v)
+    block, traps = Block(0, t, distance, flags, None, speed), _join_traps(p, v, from_p, from_v)
+    return replace(p, block=block, traps=(*p.traps, *traps))
 
 
 def _join_traps(p: Samples, v: Samples, from_p: I8, from_v: I8) -> Iterator[FormatIssue]:
@@ -202,17 +202,16 @@ def _join_traps(p: Samples, v: Samples, from_p: I8, from_v: I8) -> Iterator[Form
     for trap in v.traps:
         if trap.code not in ("nominal_clock", "rate_assumed", "rate_given"):
             yield replace(trap, message=f"in {v.name}: {trap.message}")
-    alone_p, alone_v = int(np.count_nonzero(from_v < 0)), int(np.count_nonzero(from_p < 0))
-    if alone_v:
-        message = f"{alone_v} times are only in the velocity file, so they have no distance"
-        yield FormatIssue("missing_samples", message, alone_v)
-    if alone_p:
-        message = f"{alone_p} times are only in the position file, so they have no velocity"
-        yield FormatIssue("velocity_missing", message, alone_p)
+    for lacking, code, file, value in (
+        (from_p, "missing_samples", "velocity", "distance"),
+        (from_v, "velocity_missing", "position", "velocity"),
+    ):
+        if count := int(np.count_nonzero(lacking < 0)):
+            yield FormatIssue(code, f"{count} times are only in the {file} file, so they have no {value}", count)
     # The velocity of a sample must be its difference from the previous position, multiplied by the rate.
     both = np.flatnonzero((from_p[1:] >= 0) & (from_v[1:] >= 0) & (from_p[:-1] >= 0)) + 1
-    x, rate_hz = p.value, p.timing.rate_hz
-    apart = np.abs((x[from_p[both]] - x[from_p[both - 1]]) * rate_hz - v.value[from_v[both]])
+    x, rate_hz = p.block.distance, p.timing.rate_hz
+    apart = np.abs((x[from_p[both]] - x[from_p[both - 1]]) * rate_hz - v.block.distance[from_v[both]])
     apart = apart[np.isfinite(apart)]
     wrong = int(np.count_nonzero(apart > 1.01 * (p.resolution * rate_hz + v.resolution)))
     if wrong > 0.5 * apart.size:

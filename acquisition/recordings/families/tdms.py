@@ -36,8 +36,8 @@ def _tables(path: str, data: bytes) -> list[Table]:
     from nptdms import TdmsFile
     from nptdms.log import log_manager
 
-    said = io.StringIO()
-    log_manager.console_handler.stream = said  # else it writes on stderr, which may be closed by now
+    remarks_of_reader = io.StringIO()
+    log_manager.console_handler.stream = remarks_of_reader  # else it writes on stderr, which may be closed by now
     try:
         with TdmsFile.open(io.BytesIO(data)) as file:
             groups = file.groups()
@@ -58,7 +58,7 @@ def _tables(path: str, data: bytes) -> list[Table]:
         else []
     )
     if not traps:  # else it describes the same
-        remarks = dict.fromkeys(line.partition("] ")[2] for line in said.getvalue().splitlines())
+        remarks = dict.fromkeys(line.partition("] ")[2] for line in remarks_of_reader.getvalue().splitlines())
         traps += [FormatIssue("reader_remark", f"npTDMS says: {remark}") for remark in remarks]
     return [replace(each, title=title, traps=(*each.traps, *traps)) for each in tables]
 

@@ -19,6 +19,7 @@ from acquisition.recordings.families.archive import NOT_INSIDE, members, tables_
 from acquisition.recordings.identify import foreign_format
 from acquisition.recordings.tables.format import ColumnFormat
 from acquisition.recordings.tables.table import Table
+from acquisition.recordings.tables.text import ZIP_MAGIC
 
 MOST_WORKBOOK_BYTES = 1 << 27
 """Maximum size of a workbook, bytes."""
@@ -29,7 +30,6 @@ MEMORY_BYTES = 1 << 30
 TIME_LIMIT_S = 60.0
 """Time limit of the child process: a million rows of three columns take 10 s on a laptop of 2020."""
 
-_ZIP = b"PK\x03\x04"
 _OLE = bytes.fromhex("d0cf11e0a1b11ae1")
 _NO_VALUE = re.compile(rb"</f>\s*(?:<v\s*/>|<v>\s*</v>|</c>)")
 _FEWEST_FORMULAS = 10
@@ -40,7 +40,7 @@ def _evidence(head: bytes) -> str:
     if head.startswith(_OLE):
         return "it begins with the bytes of an OLE file, as xls does"
     sheets = b"[Content_Types].xml" in head or b"xl/" in head
-    return "it is a zip archive with the parts of an xlsx" if head.startswith(_ZIP) and sheets else ""
+    return "it is a zip archive with the parts of an xlsx" if head.startswith(ZIP_MAGIC) and sheets else ""
 
 
 def _tables(path: str, data: bytes) -> list[Table]:
@@ -52,7 +52,7 @@ def _tables(path: str, data: bytes) -> list[Table]:
 
 def _refuse_formulas(path: str, data: bytes) -> None:
     """Refuse a workbook whose formulas have no values, because no spreadsheet has opened it yet."""
-    if not data.startswith(_ZIP):
+    if not data.startswith(ZIP_MAGIC):
         return
     for name, part in members(path, data):
         if name.startswith("xl/worksheets/") and (count := len(_NO_VALUE.findall(part))) >= _FEWEST_FORMULAS:

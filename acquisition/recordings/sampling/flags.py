@@ -73,15 +73,13 @@ def place(rows: ChannelRows, timing: Timing) -> F8:
 
     The time of an unread row is inferred if possible, else NaN. The array of printed times may be overwritten.
     """
-    unread, t, on_grid = rows.unread, rows.printed, timing.origin_s is not None
-    if on_grid and (timing.by_row or t is None):
+    unread, t = rows.unread, rows.printed
+    if timing.by_row or t is None:
         t = timing.time(rows.numbers)
         t[rows.remark] = np.nan
         return t
-    if t is None:
-        raise ValueError("without times only a grid has times of rows")
-    if on_grid:
-        t[~unread] = snap(t[~unread], timing, timing.resolution_s)[0]
+    if timing.origin_s is not None:
+        t[~unread] = snap(t[~unread], timing)[0]
     return place_unread(t, unread, timing) if unread.any() else t
 
 

@@ -76,7 +76,7 @@ def find_rate(t: F8, resolution: float, rate_hz: float | None = None) -> tuple[T
     probe = _probe(times)
 
     def share(grid: Timing) -> float:
-        return float(np.mean(snap(probe, grid, resolution)[1]))
+        return float(np.mean(snap(probe, grid)[1]))
 
     for origin in (0.0, float(times[0])):
         grids = [Timing(rate, origin, resolution) for rate in rates]
@@ -84,7 +84,7 @@ def find_rate(t: F8, resolution: float, rate_hz: float | None = None) -> tuple[T
         shares = {grid: share(grid) for grid in grids if median(np.diff(grid.nearest(times[:_PROBE]))) == 1.0}
         best = max(shares, key=lambda grid: shares[grid], default=None)
         if best is not None and shares[best] > _SHARE_ON_GRID:
-            beside = (Timing(rate, origin) for rate in (best.rate_hz - 1.0, best.rate_hz + 1.0) if rate > 0)
+            beside = (Timing(rate, origin, resolution) for rate in (best.rate_hz - 1.0, best.rate_hz + 1.0) if rate > 0)
             near = [grid for grid in beside if abs(grid.rate_hz - rough) <= 1.5 * rough * relative_u]
             return best, relative_u, all(share(grid) < shares[best] for grid in near)
     return Timing(rough, None, resolution), relative_u, False
@@ -122,13 +122,13 @@ def _mean_step(apart: F8, resolution: float) -> tuple[float, float]:
     return step, relative_u
 
 
-def snap(t: F8, grid: Timing, resolution: float) -> tuple[F8, B1]:
+def snap(t: F8, grid: Timing) -> tuple[F8, B1]:
     """Replace each time by the nearest grid point if the two agree within the rounding of the printed time.
 
     Return the times and a mask of those that agree.
     """
     exact = grid.time(grid.nearest(t))
-    agrees = np.abs(exact - t) <= resolution * 0.5001
+    agrees = np.abs(exact - t) <= grid.resolution_s * 0.5001
     return np.where(agrees, exact, t), agrees
 
 
@@ -283,17 +283,15 @@ def _in_bursts(path: str, t: F8, resolution: float, rate_hz: float | None) -> Ti
     if not mean > 0.0 or steps.min() < 0.0:
         return None
     within, between = steps < _SHORT_STEP * mean, steps >= mean
-    if np.count_nonzero(within) < 0.5 * (steps.size - 1) or np.mean(within | between) < _CLEAR_STEPS:
-        return None
     last: I8 = np.flatnonzero(between)
-    if last.size < _FEWEST_BURSTS:
+    few = last.size < _FEWEST_BURSTS or np.count_nonzero(within) < 0.5 * (steps.size - 1)
+    if few or np.mean(within | between) < _CLEAR_STEPS:
         return None
     intervals = np.diff(t[last])
     interval = median(intervals)
     size = t.size / (last.size + 1)
-    if np.mean(np.abs(intervals - interval) < 0.5 * interval) < _REGULAR_INTERVALS:
-        return None
-    if size < _SAME_TIME and not steps[within].any():
+    regular = np.mean(np.abs(intervals - interval) < 0.5 * interval) >= _REGULAR_INTERVALS
+    if not regular or (size < _SAME_TIME and not steps[within].any()):
         return None
     step, start = (float(each) for each in np.polyfit(last, t[last], 1))
     bursts = f"bursts of {size:.3g} samples every {1e3 * interval:.4g} ms"

@@ -40,13 +40,13 @@ def runs_of(table: Table) -> list[Table]:
     times = table.times.of_size(size)
     if is_newest_first(times.values):
         times = times.taken(np.arange(size)[::-1])
-        table = _with_times(_taken(table, np.arange(size)[::-1]), times.values, "the rows come newest first")
+        table = _with_times(_taken(table, np.arange(size)[::-1]), times, "the rows come newest first")
     t, remark = in_order(times.values, times.decimals)
     if remark:
-        return [_with_times(table, t, remark)]
+        return [_with_times(table, replace(times, values=t), remark)]
     if out_of_place(t):
         order = _sorted(t)
-        return [_with_times(_taken(table, order), t[order], "rows were out of place and were sorted")]
+        return [_with_times(_taken(table, order), times.taken(order), "rows were out of place and were sorted")]
     begins = _begins(t)
     if not begins or median(np.diff([0, *begins, size])) < FEWEST_ROWS:
         return [table]
@@ -57,12 +57,10 @@ def runs_of(table: Table) -> list[Table]:
     ]
 
 
-def _with_times(table: Table, t: F8, remark: str) -> Table:
+def _with_times(table: Table, times: Column, remark: str) -> Table:
     """Return a table with other times, which a remark explains."""
-    if table.times is None:
-        raise ValueError("the table has no times")
-    trap = FormatIssue("times_mended", f"{remark}; the times were put in order", t.size)
-    return replace(table, times=replace(table.times.of_size(t.size), values=t), traps=(*table.traps, trap))
+    trap = FormatIssue("times_mended", f"{remark}; the times were put in order", times.values.size)
+    return replace(table, times=times, traps=(*table.traps, trap))
 
 
 def _taken(table: Table, rows: I8) -> Table:
@@ -141,7 +139,11 @@ def by_label(table: Table) -> list[Table]:
         if column.words is None or table.lines is None or not table.columns:
             continue
         labels, counts = np.unique(column.words[column.words != ""], return_counts=True)
-        if not 2 <= labels.size <= _MOST_LABELS or counts.min() < FEWEST_ROWS or not _tells_apart(table, column):
+        if (
+            not 2 <= labels.size <= _MOST_LABELS
+            or counts.min() < FEWEST_ROWS
+            or not _tells_apart(table, column.name, column.words)
+        ):
             continue
         tables = []
         for label in labels.tolist():
@@ -153,13 +155,10 @@ def by_label(table: Table) -> list[Table]:
     return [table]
 
 
-def _tells_apart(table: Table, column: Column) -> bool:
+def _tells_apart(table: Table, heading: str, words: NDArray[np.str_]) -> bool:
     """Return whether words name sensors or quantities: by their heading, or because values go on from like to like."""
-    if LABEL.intersection(re.findall(r"[^\W\d_]+", column.name.lower())):
+    if LABEL.intersection(re.findall(r"[^\W\d_]+", heading.lower())):
         return True
-    words = column.words
-    if words is None:
-        return False
     changes = words[1:] != words[:-1]
     for each in table.columns:
         values = each.of_size(words.size).values

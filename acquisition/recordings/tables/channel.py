@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePath
 
 import numpy as np
 
-from acquisition.block import B1, F8, I8, U8, Block, ClockKind, Flag, SourceInfo, SourceKind
+from acquisition.block import B1, F8, I8, Block, ClockKind, Flag, SourceInfo, SourceKind
 from acquisition.errors import FormatError
 from acquisition.recordings.reading import ReadOptions
 from acquisition.recordings.recording import FormatIssue, Original, Recording
@@ -38,7 +38,7 @@ _HOUR_S, _DAY_S, _MOST_JUMPS, _SLOWEST_HZ = 3600.0, 86400.0, 10, 0.01
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Samples:
-    """The samples of a chosen channel in SI units, and the remarks on them and on the file.
+    """The samples of a chosen channel in SI units, a block, and the remarks on them and on the file.
 
     ``resolution`` is the size of the last printed digit of a value. ``lines`` are the line numbers of the samples, None
     for a binary file. ``sound`` marks the rows of the table that could be read. ``quantum`` is the step of which all
@@ -49,9 +49,7 @@ class Samples:
     table: Table
     column: Column
     measured: Measure
-    t: F8
-    value: F8
-    flags: U8
+    block: Block
     timing: Timing
     resolution: float
     traps: tuple[FormatIssue, ...]
@@ -65,8 +63,8 @@ class Samples:
         """The file's name without its folder."""
         return PurePath(self.path).name
 
-    def recording(self, family: str, data: bytes, block: Block, more: Iterable[FormatIssue] = ()) -> Recording:
-        """Return the recording of a block, which is made of these samples."""
+    def recording(self, family: str, data: bytes) -> Recording:
+        """Return the recording of these samples."""
         table, column, name = self.table, self.column, self.name
         kind: SourceKind = (
             "simulated" if says_simulated(f"{table.title} {table.run} {column.name} {name}") else "replay"
@@ -79,8 +77,8 @@ class Samples:
                 kind, name, self.timing.rate_hz, None, self.quantum, clock, self.error_m, self.timing.u_rate
             ),
             channel=column.name,
-            samples=block,
-            traps=(*self.traps, *more),
+            samples=self.block,
+            traps=self.traps,
             malformed_rows=int(np.count_nonzero(~self.sound)),
             originals=(Original(name, data),),
             title=table.title,
@@ -98,7 +96,7 @@ def read_channel(path: str, tables: Sequence[Table], answers: ReadOptions) -> Sa
     rows = rows_of(path, table, column, measured)
     rows, jumps = _without_jumps(rows, column, measured)
     samples = read_samples(path, rows, table, column, measured, rate_hz)
-    _refuse_peaks(path, samples.value)
+    _refuse_peaks(path, samples.block.distance)
     return replace(samples, traps=(*table.traps, *traps, *jumps, *samples.traps))
 
 
@@ -151,9 +149,8 @@ def read_samples(
     issues += _jumps(t, timing.rate_hz, lines)
     zeros = table.lines.zeros if table.lines else 0
     issues += [*row_traps(rows, timed, zeros), *sample_traps(flags, t, timing.rate_hz, lines)]
-    return Samples(
-        path, table, column, measured, t, value, flags, timing, rows.resolution, tuple(issues), lines, ~unread
-    )
+    block = Block(0, t, value, flags, quantity=measured.quantity, unit=measured.si)
+    return Samples(path, table, column, measured, block, timing, rows.resolution, tuple(issues), lines, ~unread)
 
 
 def _jumps(t: F8, rate_hz: float, lines: I8 | None) -> list[FormatIssue]:
@@ -174,7 +171,7 @@ def _jumps(t: F8, rate_hz: float, lines: I8 | None) -> list[FormatIssue]:
 
 def check_lengths(samples: Samples) -> Samples:
     """Return lengths with their quantum and with what is peculiar in them; see :func:`length_traps`."""
-    quantum, issues = length_traps(samples.value, samples.flags, samples.resolution, samples.lines)
+    quantum, issues = length_traps(samples.block.distance, samples.block.flags, samples.resolution, samples.lines)
     return replace(samples, quantum=quantum or None, traps=(*samples.traps, *issues))
 
 

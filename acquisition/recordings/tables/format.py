@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import islice
 
-from acquisition.block import Block
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.reading import READ_DEFAULTS, ReadOptions
 from acquisition.recordings.recording import FormatIssue, Recording, Survey
@@ -56,9 +55,8 @@ class ColumnFormat:
         if measured.quantity == "length" and (column.is_length or not column.unit):
             samples = check_lengths(samples)
         else:
-            samples = replace(samples, quantum=common_step(samples.value, samples.resolution) or None)
-        block = Block(0, samples.t, samples.value, samples.flags, quantity=measured.quantity, unit=measured.si)
-        return samples.recording(self.name, data, block)
+            samples = replace(samples, quantum=common_step(samples.block.distance, samples.resolution) or None)
+        return samples.recording(self.name, data)
 
     def survey(self, path: str, data: bytes) -> tuple[Survey, ...]:
         """Return the description of every channel, as far as the file states it."""
@@ -80,8 +78,10 @@ def _survey(path: str, table: Table, column: Column) -> Survey:
         # A channel without numbers must not prevent the listing of other channels.
         none = FormatIssue("empty_channel", str(error).removeprefix(path).lstrip(", :"))
         return Survey(table.run, column.name, column.unit, 0, None, (none,))
-    span_s = float(samples.t.max() - samples.t.min())
-    return Survey(table.run, column.name, column.unit, samples.t.size, samples.timing.rate_hz, samples.traps, span_s)
+    t = samples.block.t
+    return Survey(
+        table.run, column.name, column.unit, t.size, samples.timing.rate_hz, samples.traps, float(t.max() - t.min())
+    )
 
 
 def text_format(

@@ -49,25 +49,10 @@ def find_table(lines: tuple[str, ...]) -> Header | None:
     candidates = []
     separator_line = _SEP.match(lines[0]) if lines else None
     for order, mark in enumerate(separator_line[1] if separator_line else _MARKS):
-        if not mark and _tabs_separate(lines):
-            continue
         # Without its mark each line is a single cell, a case that the first separator has covered.
         if (not order or not mark or any(mark in each for each in lines)) and (table := _split_by(lines, mark)):
             candidates.append(((_is_torn(table), table.lines, not table.named, not _is_separator(table), order), table))
     return min(candidates)[1] if candidates else None
-
-
-def _tabs_separate(lines: Sequence[str]) -> bool:
-    """Return whether tabs separate most lines into as many cells, of which one has several words, as a date has."""
-    rows = [line.strip().split("\t") for line in lines if line.strip()]
-    width = max((len(row) for row in rows[-_PROBE:]), default=1)
-    alike = [row for row in rows if len(row) == width > 1]
-    return 2 * sum(any(map(_is_phrase, row)) for row in alike) > len(rows)
-
-
-def _is_phrase(cell: str) -> bool:
-    words = cell.split()
-    return any(parse_number(each) is None for each in words[:-1])  # "26.9 cm" has its word at the end
 
 
 def _is_torn(table: Header) -> bool:

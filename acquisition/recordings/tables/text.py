@@ -24,7 +24,7 @@ _HANZI = re.compile(rb"(?:[\xb0-\xd7\xa1-\xa3][\xa1-\xfe])+[\x21-\x7e]?")
 """Common Chinese characters in GB 2312; in cp1252 these codes are capitals with accents, which rarely come in pairs."""
 _NUMBER = re.compile(rb"[\s,;]*[-+]?[.,]?\d")
 _LOG = re.compile(rb"^[EWIDV] \(\d{1,10}\) ", re.MULTILINE)
-_ZIP = b"PK\x03\x04"
+ZIP_MAGIC = b"PK\x03\x04"
 _PAGE_BYTES = 1 << 16
 _HEAD_SPAN = 1 << 16
 
@@ -153,7 +153,7 @@ def text_of(path: str, data: bytes) -> Text:
 def is_text(data: bytes) -> bool:
     """Return whether bytes can be text: UTF-8, UTF-16 or an 8-bit code with few control characters."""
     head = data[:HEAD_BYTES]
-    if head.startswith(_ZIP):  # an uncompressed archive of texts has few control characters
+    if head.startswith(ZIP_MAGIC):  # an uncompressed archive of texts has few control characters
         return False
     if _utf16(head):
         return True

@@ -50,11 +50,11 @@ function written(v, digits = 5) {
   const size = Math.abs(v);
   return minus(size !== 0 && (size < 1e-4 || size >= 1e6) ? Number(v.toPrecision(3)).toExponential().replace("e+", "e") : String(Number(v.toPrecision(digits))));
 }
-// Numbers on an axis; a logarithmic one has them at powers of ten, or also at 2 and 5 if it spans less than two.
+// Numbers on an axis; a logarithmic one has them at powers of ten, or at more places if it spans less than two.
 const ticks = (_, splits) => splits.map((v) => (v === null ? "" : written(v, 7)));
 function powers(plot, splits, axis) {
-  const { min, max } = plot.scales[axis === 0 ? "x" : "y"], few = max < 30 * min;
-  return splits.map((v) => (v !== null && (few ? [1, 2, 5] : [1]).some((m) => Math.abs(Math.log10(v / m) - Math.round(Math.log10(v / m))) < 1e-9) ? v : null));
+  const { min, max } = plot.scales[axis === 0 ? "x" : "y"], places = max < 6 * min ? [1, 2, 3, 5, 7] : max < 30 * min ? [1, 2, 5] : [1];
+  return splits.map((v) => (v !== null && places.some((m) => Math.abs(Math.log10(v / m) - Math.round(Math.log10(v / m))) < 1e-9) ? v : null));
 }
 
 // All 1 to 9 of each power of ten: uPlot's own begin at the end of the axis, which is no round number.

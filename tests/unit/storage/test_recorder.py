@@ -33,17 +33,17 @@ def test_everything_put_is_in_the_log_in_order(tmp_path: Path) -> None:
     with Recorder(tmp_path / "run.wire", HEADER, VirtualClock(7)) as recording:
         sink: Sink = recording
         for number in range(500):
-            recording.put(number % 2, number, b"R%04d\r" % number)
+            recording.reads([(number % 2, number, b"R%04d\r" % number)])
         sink.reads([(1, 500, b"last")])
         recording.mark("let go")
-        recording.mark("stopped", host_ns=9, channel=1)
+        recording.mark("stopped", host_ns=9)
         sink.event(1, 501, Lost(why="unplugged"))
     whole = list(read_log(tmp_path / "run.wire"))
     records = [record for record in whole if record.kind is not RecordKind.HEADER]
     data = [(record.channel, record.mono_ns, record.payload) for record in records[:501]]
     assert data == [(n % 2, n, b"R%04d\r" % n) for n in range(500)] + [(1, 500, b"last")]
     reported = [(record.kind, record.channel, record.mono_ns, record.payload) for record in records[501:503]]
-    assert reported == [(RecordKind.MARK, 0, 7, b"let go"), (RecordKind.MARK, 1, 9, b"stopped")]
+    assert reported == [(RecordKind.MARK, 0, 7, b"let go"), (RecordKind.MARK, 0, 9, b"stopped")]
     assert json_of(records[503]) == {"kind": "lost", "facts": {"why": "unplugged"}}
     assert (records[504].kind, len(records)) == (RecordKind.END, 505)
     assert json_of(records[504]) == {"records": len(whole) - 1, "dropped_records": 0, "dropped_bytes": 0}
@@ -55,10 +55,10 @@ def test_a_slow_sync_holds_up_no_write() -> None:
     disk = Disk()
     recording = recorder(disk, sync_every_s=1e-4)
     disk.syncs_pass.clear()
-    recording.put(0, 0, b"first")
+    recording.reads([(0, 0, b"first")])
     assert disk.held.wait(WAIT_S)
     for number in range(100):
-        recording.put(0, number, b"x")
+        recording.reads([(0, number, b"x")])
     status = recording.drain()
     assert (status.records, status.synced_records) == (102, 1)
     disk.syncs_pass.set()
@@ -73,15 +73,15 @@ def test_an_overflow_is_told_where_it_happened() -> None:
     disk = Disk()
     recording = recorder(disk, queue_bytes=530)
     disk.writes_pass.clear()
-    recording.put(0, 0, b"first")
+    recording.reads([(0, 0, b"first")])
     assert disk.held.wait(WAIT_S)
     for number in range(100):
-        recording.put(number % 2, number, bytes([number]) * 10)
-    recording.put(0, 100, b"")  # would fit, but must not come before the event
+        recording.reads([(number % 2, number, bytes([number]) * 10)])
+    recording.reads([(0, 100, b"")])  # would fit, but must not come before the event
     assert (recording.status.dropped_records, recording.status.dropped_bytes) == (88, 870)
     disk.writes_pass.set()
     recording.drain()
-    recording.put(0, 101, b"after")
+    recording.reads([(0, 101, b"after")])
     recording.close()
     _, _, *records = list(parse_log(bytes(disk.data)))
     assert [record.payload for record in records[:13]] == [bytes([n]) * 10 for n in range(13)]
@@ -99,15 +99,15 @@ def test_events_and_marks_outlast_an_overflow() -> None:
     disk = Disk()
     recording = recorder(disk, queue_bytes=200)
     disk.writes_pass.clear()
-    recording.put(0, 0, b"first")
+    recording.reads([(0, 0, b"first")])
     assert disk.held.wait(WAIT_S)
     for number in range(1, 20):
-        recording.put(0, number, b"x" * 10)
+        recording.reads([(0, number, b"x" * 10)])
         recording.event(0, number, StoredEvent("lost", {"number": number}))
     recording.mark("now", host_ns=20)
     disk.writes_pass.set()
     recording.drain()
-    recording.put(0, 21, b"after")
+    recording.reads([(0, 21, b"after")])
     recording.close()
     _, _, *records, after, _ = list(parse_log(bytes(disk.data)))
     events = [json_of(record) for record in records if record.kind is RecordKind.EVENT]
@@ -123,7 +123,7 @@ def test_a_read_longer_than_a_record_is_divided() -> None:
     """A record has 65535 bytes at most."""
     disk, long = Disk(), bytes(range(256)) * 1000
     recording = recorder(disk)
-    recording.put(1, 5, long)
+    recording.reads([(1, 5, long)])
     recording.close()
     records = [record for record in parse_log(bytes(disk.data)) if record.kind is RecordKind.DATA]
     assert b"".join(record.payload for record in records) == long
@@ -136,10 +136,10 @@ def test_a_full_disk_stops_the_recording_and_counts_what_it_lost() -> None:
     recording = recorder(disk)
     disk.room = len(disk.data) + SECOND_COPY + 1000
     disk.writes_pass.clear()
-    recording.put(0, 0, bytes(SECOND_COPY))
+    recording.reads([(0, 0, bytes(SECOND_COPY))])
     assert disk.held.wait(WAIT_S)
     for number in range(200):
-        recording.put(0, number, b"R%04d\r" % number)
+        recording.reads([(0, number, b"R%04d\r" % number)])
     disk.writes_pass.set()
     status = recording.drain()
     kept = sum(record.kind is RecordKind.DATA for record in parse_log(bytes(disk.data)))
@@ -156,7 +156,7 @@ def test_what_a_full_disk_took_is_synced_at_once() -> None:
     disk.room = len(disk.data) + 100
     disk.syncs_pass.clear()
     for number in range(10):
-        recording.put(0, number, b"x")
+        recording.reads([(0, number, b"x")])
     assert disk.held.wait(WAIT_S)
     assert recording.status.error
     disk.syncs_pass.set()
@@ -168,10 +168,10 @@ def test_a_failed_sync_stops_the_recording() -> None:
     """Records that may never reach the disk must not look safe."""
     disk = Disk()
     recording = recorder(disk)
-    recording.put(0, 0, b"x")
+    recording.reads([(0, 0, b"x")])
     assert recording.drain(sync=True).synced_records == 2
     disk.sync_trouble = OSError(errno.EIO, "Input/output error")
-    recording.put(0, 1, b"y")
+    recording.reads([(0, 1, b"y")])
     status = recording.drain(sync=True)
     assert "could not be synced to the disk (Input/output error)" in status.error
     assert (status.records, status.synced_records) == (3, 2)

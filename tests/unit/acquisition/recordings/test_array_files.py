@@ -140,6 +140,15 @@ def test_text_of_labchart(tmp_path: Path, times: bool) -> None:
     holds(open_recording(path, ReadOptions(run="Block 2")))
 
 
+@pytest.mark.parametrize("text", ["Interval=\t0.05 s\nChannelTitle=\tx\n", "Interval=0.05 s\nChannelTitle=\tx\n0\t1\n"])
+def test_labchart_text_that_ends_early_is_refused(tmp_path: Path, text: str) -> None:
+    """Lines above the rows without rows, or without the tab behind the interval, are an error of one line."""
+    path = tmp_path / "run.txt"
+    path.write_text(text)
+    with pytest.raises(FormatError):
+        open_recording(path)
+
+
 @pytest.mark.parametrize("step", ["50 msec/sample", "0.05 sec/sample"])
 def test_text_of_acqknowledge(tmp_path: Path, step: str) -> None:
     """The numbers of samples above the rows are no row."""

@@ -36,7 +36,7 @@ def test_a_log_is_seen_as_it_grows(tmp_path: Path) -> None:
     with Recorder(tmp_path / "run.wire", header, VirtualClock()) as recorder:
         feed = LogFeed(tmp_path / "run.wire")
         for number in range(50):
-            recorder.put(0, number * 100_000_000, b"R%04d\r" % (300 + number))
+            recorder.reads([(0, number * 100_000_000, b"R%04d\r" % (300 + number))])
         recorder.mark("released", host_ns=2_000_000_000)
         recorder.event(0, 2_500_000_000, TimedOut(after_s=1.0))
         recorder.drain()
@@ -82,7 +82,7 @@ def put_samples(recorder: Recorder, numbers: range) -> None:
             distance_m=distance_m,
             temperature_c=20.0,
         )
-        recorder.put(0, number * 10_000_000 + 1_000_000 * (number % 3), frame)
+        recorder.reads([(0, number * 10_000_000 + 1_000_000 * (number % 3), frame)])
 
 
 def test_marks_and_triggers_wait_for_the_first_sample(tmp_path: Path) -> None:

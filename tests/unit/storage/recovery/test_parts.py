@@ -27,7 +27,7 @@ def send(recorder: Recorder, channel: int, start_s: float, seconds: float, first
     """Record a sensor that sends at 100 Hz; the clock of the device shows the time since reading 0."""
     for n in range(int(100 * seconds)):
         echo_us = 2e6 * (0.25 + 0.05 * math.cos(0.083 * n)) / 344
-        recorder.put(channel, int((start_s + n / 100) * SECOND_NS), line(first + n, echo_us))
+        recorder.reads([(channel, int((start_s + n / 100) * SECOND_NS), line(first + n, echo_us))])
 
 
 def record_event(recorder: Recorder, channel: int, at_s: float, event: Event) -> None:

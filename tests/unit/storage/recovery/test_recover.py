@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -57,7 +58,7 @@ def write(path: Path, header: LogHeader = HEADER, count: int = 200) -> Path:
     with Recorder(path, header, VirtualClock(START_NS)) as recorder:
         for number, (host_ns, data) in enumerate(wire(count)):
             for sensor in header.sensors:
-                recorder.put(sensor.channel, host_ns, data)
+                recorder.reads([(sensor.channel, host_ns, data)])
             if number == count // 2:
                 recorder.mark("half way", host_ns=host_ns)
     return path
@@ -130,10 +131,10 @@ def test_no_frame_is_put_together_across_a_break(event: Event, tmp_path: Path) -
     log = tmp_path / "run.wire"
     with Recorder(log, header, VirtualClock()) as recorder:
         for channel in (0, 1):
-            recorder.put(channel, 1, b"R1000\rR1000\rR12")
+            recorder.reads([(channel, 1, b"R1000\rR1000\rR12")])
         recorder.event(0, 2, event)
         for channel in (0, 1):
-            recorder.put(channel, 3, b"34\rR1000\rR1000\r")
+            recorder.reads([(channel, 3, b"34\rR1000\rR1000\r")])
     broken, whole = (samples_of(run.path) for run in recover(log).runs)
     assert 1234 not in np.round(broken.distance * 1000).tolist()
     assert 1234 in np.round(whole.distance * 1000).tolist()
@@ -142,7 +143,7 @@ def test_no_frame_is_put_together_across_a_break(event: Event, tmp_path: Path) -
 
 def test_the_last_calibration_in_the_log_is_applied(tmp_path: Path) -> None:
     """A calibration made after the start counts for all of the run: what is stored are echo times."""
-    sensor = SensorEntry(0, FAMILY, calibration=Calibration(offset_m=1.0).to_mapping())
+    sensor = SensorEntry(0, FAMILY, calibration=asdict(Calibration(offset_m=1.0)))
     log = WireLogWriter(tmp_path / "run.wire", LogHeader(sensors=(sensor,), mono_ns=0, unix_ns=0))
     for host_ns, data in wire(50):
         append(log, RecordKind.DATA, data, mono_ns=host_ns)
@@ -150,8 +151,8 @@ def test_the_last_calibration_in_the_log_is_applied(tmp_path: Path) -> None:
     recover(log.path, tmp_path / "a.h5")
     with Recorder(tmp_path / "b.wire", LogHeader(sensors=(sensor,), mono_ns=0, unix_ns=0), VirtualClock()) as recorder:
         for host_ns, data in wire(50):
-            recorder.put(0, host_ns, data)
-        recorder.event(0, 1, StoredEvent("calibration", Calibration(offset_m=2.0).to_mapping()))
+            recorder.reads([(0, host_ns, data)])
+        recorder.event(0, 1, StoredEvent("calibration", asdict(Calibration(offset_m=2.0))))
     recover(tmp_path / "b.wire", tmp_path / "b.h5")
     with open_run(tmp_path / "a.h5") as first, open_run(tmp_path / "b.h5") as second:
         assert first.samples().distance[0] == pytest.approx(1.3, abs=1e-4)
@@ -235,7 +236,7 @@ def test_a_log_that_is_still_written_is_not_recovered(tmp_path: Path) -> None:
     log = tmp_path / "run.wire"
     with Recorder(log, HEADER, VirtualClock()) as recorder:
         for host_ns, data in wire(100):
-            recorder.put(0, host_ns, data)
+            recorder.reads([(0, host_ns, data)])
         recorder.drain()
         with pytest.raises(LogGrowing):
             recover(log)
@@ -255,7 +256,7 @@ def test_a_log_without_its_name_is_recovered_from_its_recorder(tmp_path: Path, b
     log = tmp_path / "bench" / "run.wire"
     with Recorder(log, HEADER, VirtualClock()) as recorder:
         for host_ns, data in wire(50):
-            recorder.put(0, host_ns, data)
+            recorder.reads([(0, host_ns, data)])
         recorder.drain()
         whole = log.read_bytes()
         if by == "renamed":
@@ -265,7 +266,7 @@ def test_a_log_without_its_name_is_recovered_from_its_recorder(tmp_path: Path, b
         if by == "replaced":
             log.write_bytes(b"mine")
         for host_ns, data in wire(100)[50:]:
-            recorder.put(0, host_ns, data)
+            recorder.reads([(0, host_ns, data)])
     report = recover(recorder.contents(), tmp_path / "run.h5", remove_log=True)
     assert (report.runs[0].samples, report.log_removed, report.damage.intact) == (100, False, True)
     with open_run(tmp_path / "run.h5") as run:
@@ -279,7 +280,7 @@ def test_what_a_sensor_did_not_give_is_named(tmp_path: Path) -> None:
     """A stretch without echoes and a sensor that is silent until the end are in the run file."""
     with Recorder(tmp_path / "run.wire", HEADER, VirtualClock(START_NS)) as recorder:
         for n in range(1000):
-            recorder.put(0, START_NS + 10_000_000 * n, line(n, math.nan if 300 <= n < 500 else 1500.0))
+            recorder.reads([(0, START_NS + 10_000_000 * n, line(n, math.nan if 300 <= n < 500 else 1500.0))])
         recorder.event(0, START_NS + 20_000_000_000, RunEnded(by="seconds"))
     (made,) = recover(tmp_path / "run.wire").runs
     with open_run(made.path) as run:

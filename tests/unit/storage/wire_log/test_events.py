@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -66,7 +67,7 @@ def test_an_event_has_its_facts_in_the_run_file_and_its_type_again(
 ) -> None:
     """From the recorder to the provenance of the run file; facts that are not stated are not written."""
     with Recorder(tmp_path / "run.wire", HEADER, VirtualClock()) as recorder:
-        recorder.put(0, 1, b"R1000\r")
+        recorder.reads([(0, 1, b"R1000\r")])
         recorder.event(0, 2, event)
     with open_run(recover(tmp_path / "run.wire").main.path) as run:
         (entry,) = run.provenance["events"]
@@ -120,7 +121,7 @@ def test_an_event_that_cannot_be_read_is_kept_with_the_reason(tmp_path: Path, pa
 
 def test_a_calibration_is_known_with_any_facts(tmp_path: Path) -> None:
     """All numbers of the calibration are in the run file."""
-    facts = Calibration(offset_m=0.1).to_mapping()
+    facts = asdict(Calibration(offset_m=0.1))
     (event,) = events_in_run_file(tmp_path, json.dumps({"kind": "calibration", "facts": facts}).encode("ascii"))
     assert event.facts == facts
     assert event.typed is not None
