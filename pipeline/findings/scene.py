@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from pipeline.bench.plausible import slips
-from pipeline.bench.scene import Scene
+from pipeline.bench.scene import BENCH_KEYS, PLACES, Scene
 from pipeline.bench.spring import HEAVIEST_SHARE
 from pipeline.notice import Notice
 from pipeline.numerics.estimate import Estimate
@@ -27,13 +27,9 @@ def scene_findings(scene: Scene, effects: tuple[Effect, ...], estimates: Mapping
     ['spring_mass_missing', 'uncertainty_missing']
     """
     springs = any(effect.name == "spring_mass" and effect.included for effect in effects)
-    used = {
-        "[bob] mass_kg": scene.bob_mass_kg,
-        "[spring] mass_kg": scene.spring_mass_kg if springs else None,
-        "[pendulum] length_m": scene.pendulum_length_m,
-        "[disc] diameter_m": scene.disc_diameter_m,
-    }
-    exact = [name for name, estimate in used.items() if estimate is not None and estimate.u == 0]
+    used = ("bob", "mass_kg"), *([("spring", "mass_kg")] if springs else []), ("pendulum", "length_m"), PLACES[DISC]
+    quantities = [BENCH_KEYS[place] for place in used]
+    exact = [q.label for q in quantities if (x := getattr(scene, q.attribute)) is not None and x.u == 0]
     perhaps = slips(scene)
     said = [each.clause if each.asks else f"{each.clause}." for each in perhaps]
     # A drag coefficient that no disc has says nothing new if the diameter is in doubt already.
@@ -52,4 +48,4 @@ def _drag(estimates: Mapping[str, Estimate]) -> Iterator[str]:
     """Yield the question about a drag coefficient that no disc has."""
     drag, (low, high) = estimates.get("drag_coefficient"), USUAL_DRAG
     if drag is not None and not low - 2.0 * drag.u <= drag.value <= high + 2.0 * drag.u:
-        yield f"the drag coefficient would be {drag.value:.2g}, which no disc has: is [disc] diameter_m right?"
+        yield f"the drag coefficient would be {drag.value:.2g}, which no disc has: is its diameter right?"
