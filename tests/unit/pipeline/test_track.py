@@ -9,18 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.block import UNITS, Flag
 from pipeline.errors import PipelineError, TrackError
-from pipeline.track import Quality, Track
-from pipeline.units import RECORDED_UNITS
-
-
-def test_quality_is_the_run_files_flags() -> None:
-    """The pipeline's bits and the acquisition's are one table, but for one that no file holds."""
-    assert {bit.name: bit.value for bit in Quality if bit is not Quality.OUTSIDE} == {
-        bit.name: bit.value for bit in Flag
-    }
-    assert int(Quality.OUTSIDE) not in {bit.value for bit in Flag}
+from pipeline.track import Track
 
 
 @pytest.mark.parametrize(
@@ -56,8 +46,3 @@ def test_any_numbers_make_a_track_or_a_track_error(t: list[float], y: list[float
     np.testing.assert_array_equal(track.y, y)
     assert track.rate_hz > 0
     assert np.isfinite(track.rate_hz)
-
-
-def test_units_are_those_of_blocks() -> None:
-    """The pipeline's quantities and the acquisition's are one table."""
-    assert {recorded.quantity: unit for unit, recorded in RECORDED_UNITS.items()} == UNITS
