@@ -23,6 +23,7 @@ from springmass.commands import COMMANDS, app
 from springmass.commands.options import HOW_READ, THE_PAGE
 from springmass.comparing.comparison import ComparisonResult
 from springmass.result.run_json import RESULT_SCHEMA, NumberWithU, RunResult
+from springmass.terminal.printing import with_options
 
 PAGE = Path(__file__).with_name("command-line.md")
 FINDINGS_PAGE = Path(__file__).with_name("findings.md")
@@ -201,7 +202,9 @@ def findings_page() -> str:
         parts.append(f"## {symptom}\n\n| code | severity | meaning | what to do |\n| --- | --- | --- | --- |")
         for code, kind in sorted(group, key=lambda item: (min(RANK[s] for s in item[1].severity), item[0])):
             severity = " or ".join(SHOWN[one] for one in sorted(kind.severity, key=RANK.__getitem__))
-            parts.append(f"| `{code}` | {severity} | {kind.meaning} | {usual_advice(code) or '-'} |")
+            parts.append(
+                f"| `{code}` | {severity} | {kind.meaning} | {with_options(code, usual_advice(code)) or '-'} |"
+            )
         parts[-1] += "\n"
     return "\n".join([*parts, GONE])
 

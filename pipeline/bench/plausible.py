@@ -44,16 +44,15 @@ class Slip(NamedTuple):
 
     @property
     def clause(self) -> str:
-        """The words behind the place of the value in a scene file."""
-        table, key = PLACES[self.attribute]
-        return f"[{table}] {key} = {self.words}"
+        """The words behind the label of the value."""
+        return f"{BENCH_KEYS[PLACES[self.attribute]].label} = {self.words}"
 
 
 def slips(scene: Scene) -> tuple[Slip, ...]:
     """Return the values that are perhaps slips, and those that are no larger than their uncertainties.
 
     >>> [slip.clause for slip in slips(Scene(disc_diameter_m=10.2))]
-    ['[disc] diameter_m = 10.2 is larger than a bench: 10.2 m or 10.2 cm?']
+    ['diameter of the disc = 10.2 is larger than a bench: 10.2 m or 10.2 cm?']
     """
     found = []
     for quantity in BENCH_KEYS.values():

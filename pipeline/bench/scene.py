@@ -38,14 +38,15 @@ class _Field(Generic[TakenT, KeptT]):
 
 
 class Stated(_Field[Estimate | float | str | tuple[float, float], Estimate]):
-    """A quantity of a scene: its table and key in a scene file, its unit, and its allowed range, including both ends.
+    """A quantity of a scene: its table and key in a scene file, unit, label, and allowed range with both ends.
 
     The ends lie far beyond any bench. The calculations are known to be valid between them, so every allowed value gives
     a number or a finding. A value with a wrong exponent is rejected when it is read.
     """
 
-    def __init__(self, table: str, key: str, unit: str, least: float, greatest: float) -> None:
+    def __init__(self, table: str, key: str, unit: str, least: float, greatest: float, label: str) -> None:
         self.place, self.unit, self.least, self.greatest = (table, key), unit, least, greatest
+        self.label = label
 
     def allowed(self) -> str:
         """Return the range in words."""
@@ -57,31 +58,34 @@ class Stated(_Field[Estimate | float | str | tuple[float, float], Estimate]):
     def checked(self, given: Any, where: str) -> Estimate:
         """Return the estimate of a number, of a text with its unit, of a pair (value, u), or of a table of the two."""
         table, key = self.place
-        name = f"{where}: [{table}] {key}"
+        place = f"{where}: [{table}] {key}"
         value, u, unit = given, 0.0, ""
         if isinstance(given, Mapping):
             if "value" not in given or set(given) - {"value", "u"}:
-                raise SceneError(f"{name} must be a number or {{ value = ..., u = ... }}, got {_short(dict(given))}")
+                raise SceneError(
+                    f"must be a number or {{ value = ..., u = ... }}, got {_short(dict(given))}", where=f"{place} "
+                )
             value, u = given["value"], given.get("u", 0.0)
         elif isinstance(given, str):
             try:
                 given = typed(given, self.unit)
             except ValueError as error:
-                raise SceneError(f"{name} {error}, got {_short(given)}") from error
+                raise SceneError(f"{error}, got {_short(given)}", where=f"{place} ") from error
             value, u = given.value, given.u
         elif isinstance(given, tuple) and len(given) == 2:  # as in Scene(bob_mass_kg=(0.2, 0.0001))
             value, u = given
         elif hasattr(given, "nominal_value"):  # an estimate, or a number of the uncertainties package
             value, u, unit = given.nominal_value, given.std_dev, getattr(given, "unit", "")
         if unit and unit != self.unit:
-            raise SceneError(f"{name} must be in {self.unit or 'no unit'}, got {unit}")
-        number, spread = _number(value, name), _number(u, f"{name}, its u")
+            raise SceneError(f"must be in {self.unit or 'no unit'}, got {unit}", where=f"{place} ")
+        number, spread = _number(value, f"{place} "), _number(u, f"{place}, its u ")
         if not self.least <= number <= self.greatest:
-            raise SceneError(f"{name} must be {self.allowed()}, got {number:g}")
+            raise SceneError(f"must be {self.allowed()}, got {number:g}", where=f"{place} ")
         if spread < 0:
-            raise SceneError(f"{name}: its u must not be negative, got {spread:g}")
+            raise SceneError(f"its u must not be negative, got {spread:g}", where=f"{place}: ")
         if spread > self.greatest:
-            raise SceneError(f"{name}: its u must be at most {self.greatest:g} {self.unit}, got {spread:g}".rstrip())
+            most = f"{self.greatest:g} {self.unit}".rstrip()
+            raise SceneError(f"its u must be at most {most}, got {spread:g}", where=f"{place}: ")
         return given if isinstance(given, Estimate) else Estimate(number, spread, self.unit)
 
 
@@ -124,26 +128,26 @@ class Scene:
     torsion balance, a light spot or a beam.
     """
 
-    bob_mass_kg: Stated = Stated("bob", "mass_kg", "kg", 1e-12, 1e6)
-    spring_mass_kg: Stated = Stated("spring", "mass_kg", "kg", 0.0, 1e6)
+    bob_mass_kg: Stated = Stated("bob", "mass_kg", "kg", 1e-12, 1e6, "mass of the bob")
+    spring_mass_kg: Stated = Stated("spring", "mass_kg", "kg", 0.0, 1e6, "mass of the spring")
     spring_none: TrueOrFalse = TrueOrFalse("spring", "none")
-    spring_constant_n_per_m: Stated = Stated("spring", "constant_n_per_m", "N/m", 1e-12, 1e12)
-    spring_cubic_n_per_m3: Stated = Stated("spring", "cubic_n_per_m3", "N/m3", -1e18, 1e18)
-    pendulum_length_m: Stated = Stated("pendulum", "length_m", "m", 1e-4, 1e4)
-    disc_diameter_m: Stated = Stated("disc", "diameter_m", "m", 1e-6, 1e3)
-    air_temperature_c: Stated = Stated("air", "temperature_c", "degC", -100.0, 200.0)
-    air_pressure_pa: Stated = Stated("air", "pressure_pa", "Pa", 1e-3, 1e7)
-    air_relative_humidity: Stated = Stated("air", "relative_humidity", "", 0.0, 1.0)
-    sensor_sigma_m: Stated = Stated("sensor", "sigma_m", "m", 1e-12, 1e3)
+    spring_constant_n_per_m: Stated = Stated("spring", "constant_n_per_m", "N/m", 1e-12, 1e12, "spring constant")
+    spring_cubic_n_per_m3: Stated = Stated("spring", "cubic_n_per_m3", "N/m3", -1e18, 1e18, "cubic term of the spring")
+    pendulum_length_m: Stated = Stated("pendulum", "length_m", "m", 1e-4, 1e4, "length of the pendulum")
+    disc_diameter_m: Stated = Stated("disc", "diameter_m", "m", 1e-6, 1e3, "diameter of the disc")
+    air_temperature_c: Stated = Stated("air", "temperature_c", "degC", -100.0, 200.0, "air temperature")
+    air_pressure_pa: Stated = Stated("air", "pressure_pa", "Pa", 1e-3, 1e7, "air pressure")
+    air_relative_humidity: Stated = Stated("air", "relative_humidity", "", 0.0, 1.0, "humidity of the air")
+    sensor_sigma_m: Stated = Stated("sensor", "sigma_m", "m", 1e-12, 1e3, "noise of the sensor")
     sensor_position: Choice = Choice("sensor", "position", lambda: POSITIONS)
-    sensor_mean_samples: Stated = Stated("sensor", "mean_samples", "", 1.0, 1e4)
-    sensor_lag_s: Stated = Stated("sensor", "lag_s", "s", 0.0, 1e3)
-    sensor_clock_ppm: Stated = Stated("sensor", "clock_ppm", "ppm", -1e5, 1e5)
-    start_displacement_m: Stated = Stated("start", "displacement_m", "m", -1e3, 1e3)
-    start_velocity_m_per_s: Stated = Stated("start", "velocity_m_per_s", "m/s", -1e6, 1e6)
-    gamma_per_s: Stated = Stated("damping", "gamma_per_s", "1/s", 0.0, 1e6)
-    beta_per_m_s: Stated = Stated("damping", "beta_per_m_s", "1/(m s)", 0.0, 1e6)
-    mu_m_per_s: Stated = Stated("damping", "mu_m_per_s", "m/s", 0.0, 1e6)
+    sensor_mean_samples: Stated = Stated("sensor", "mean_samples", "", 1.0, 1e4, "running mean of the sensor")
+    sensor_lag_s: Stated = Stated("sensor", "lag_s", "s", 0.0, 1e3, "lag of the sensor")
+    sensor_clock_ppm: Stated = Stated("sensor", "clock_ppm", "ppm", -1e5, 1e5, "error of the clock")
+    start_displacement_m: Stated = Stated("start", "displacement_m", "m", -1e3, 1e3, "displacement at the start")
+    start_velocity_m_per_s: Stated = Stated("start", "velocity_m_per_s", "m/s", -1e6, 1e6, "velocity at the start")
+    gamma_per_s: Stated = Stated("damping", "gamma_per_s", "1/s", 0.0, 1e6, "linear damping")
+    beta_per_m_s: Stated = Stated("damping", "beta_per_m_s", "1/(m s)", 0.0, 1e6, "quadratic damping")
+    mu_m_per_s: Stated = Stated("damping", "mu_m_per_s", "m/s", 0.0, 1e6, "dry friction")
     damping_law: Choice = Choice("damping", "law", law_names)
 
     @classmethod
@@ -224,7 +228,7 @@ def _check_vapour(scene: Scene, where: str) -> None:
         )
 
 
-def _number(value: object, name: str) -> float:
+def _number(value: object, where: str) -> float:
     if not isinstance(value, bool) and isinstance(value, int | float):
         try:
             number = float(value)
@@ -232,7 +236,7 @@ def _number(value: object, name: str) -> float:
             number = math.inf  # an integer of more than 308 digits
         if math.isfinite(number):
             return number
-    raise SceneError(f"{name} must be a finite number, got {_short(value)}")
+    raise SceneError(f"must be a finite number, got {_short(value)}", where=where)
 
 
 def _short(value: object) -> str:

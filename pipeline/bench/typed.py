@@ -59,6 +59,7 @@ SCALES: dict[str, dict[str, Scale]] = {
 
 _SIGNS = str.maketrans({"\u2212": "-", "\u2013": "-", "µ": "u", "μ": "u", "\u00a0": " ", "\u202f": " "})
 _FLOAT = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_UNIT_TWICE = re.compile(rf"({_FLOAT})\s*(?![eE][-+]?\d)([^\s\d.()+-]\S*?)\s*(?:\+/-|\+-|±)\s*({_FLOAT})\s*\2")
 _TYPED = re.compile(rf"(\(?\s*{_FLOAT}(?:\(\d*\.?\d+\))?(?:\s*(?:\+/-|\+-|±)\s*{_FLOAT})?\s*\)?)\s*(\S.*)?")
 
 
@@ -77,13 +78,14 @@ def typed(text: str, unit: str) -> Estimate:
 
     Examples
     --------
-    >>> typed("217.6 g", "kg"), typed("10.2+/-0.1 cm", "m"), typed("1005(1) hPa", "Pa"), typed("21 °C", "degC")
+    >>> typed("217.6 g", "kg"), typed("10.2 cm ± 0.1 cm", "m"), typed("1005(1) hPa", "Pa"), typed("21 °C", "degC")
     (0.2176 kg, 0.1020(10) m, 1.0050(10)e+05 Pa, 21 degC)
     """
     from uncertainties import ufloat_fromstr
     from uncertainties.core import NegativeStdDev
 
-    match = _TYPED.fullmatch(text.translate(_SIGNS).strip())
+    text = _UNIT_TWICE.sub(r"\1+/-\3 \2", text.translate(_SIGNS).strip())
+    match = _TYPED.fullmatch(text)
     if match is None:
         raise ValueError("must be a number, with its standard uncertainty as 0.2007+/-0.0001 or 0.2007(1)")
     if (match[2] or "").startswith(","):

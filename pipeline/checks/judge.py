@@ -12,7 +12,7 @@ from pipeline.bench.scene import Scene
 from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.checks.half import half_frequency
 from pipeline.checks.limits import beyond_limits
-from pipeline.checks.model import colour, excess, phases, slow_change
+from pipeline.checks.model import colour, slow_change
 from pipeline.checks.residual import Misfit, Outcome, Residual, residual_of
 from pipeline.checks.rounding import rounding
 from pipeline.checks.sensor import held, held_count, held_numbers, smoothed
@@ -30,9 +30,7 @@ TESTS: tuple[Callable[[Residual], Outcome | None], ...] = (
     folded_shape,
     held,
     smoothed,
-    excess,
     colour,
-    phases,
 )
 
 

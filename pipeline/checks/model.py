@@ -7,15 +7,14 @@ import math
 import numpy as np
 
 from pipeline.checks.residual import Outcome, Residual
-from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_CURVE, MISFIT, NOTICEABLE, normal_quantile
-from pipeline.numerics.regression import chi2_quantile, correlation_length
+from pipeline.numerics.levels import FALSE_ALARM, NOTICEABLE, normal_quantile
+from pipeline.numerics.regression import correlation_length
 from pipeline.samples.condition import COARSE
 from pipeline.track import F8
 from pipeline.windows.demodulate import FINEST
 
 # Degree of the polynomials of a slow change: it follows from the four parameters of a smooth curve through a run.
 SLOW = 4
-ALARM_OF_A_TEST = FALSE_ALARM / 2.0  # probability of a false alarm of each of the two tests that decide by one alone
 
 
 def slow_change(residual: Residual) -> Outcome | None:
@@ -45,40 +44,21 @@ def slow_change(residual: Residual) -> Outcome | None:
     return Outcome("model_misfit", {"slow_change": ratio}) if fdtrc(count, free, ratio) < FALSE_ALARM else None
 
 
-def excess(residual: Residual) -> Outcome | None:
-    """Test whether the part that the whole model does not describe is larger than the noise within a period."""
-    rms, noise = residual.fitted.waveform.rms, residual.noise
-    if rms > MISFIT * max(noise, residual.rounding):
-        return Outcome("model_misfit", {"rms_m": rms, "noise_m": noise})
-    return None
-
-
-def phases(residual: Residual) -> Outcome | None:
-    """Test whether the phases scatter as their noise predicts."""
-    phase = residual.fitted.phase
-    free = (phase.residual.size - phase.coefficients.size) / phase.correlation
-    if free >= 1.0 and phase.reduced_chi2 > chi2_quantile(1.0 - ALARM_OF_A_TEST, free) / free:
-        chi2 = phase.reduced_chi2
-        return Outcome("model_misfit", {"phase_chi2": chi2, "phase_scatter": math.sqrt(chi2)})
-    return None
-
-
 def colour(residual: Residual) -> Outcome | None:
-    """Test whether more than half of the residual that no other test explains can be predicted from another sample.
+    """Test whether more than half of what the whole fit leaves can be predicted from what it left in another period.
 
-    The correlations of n samples of white noise have a standard deviation of :math:`n^{-1/2}`. With the probability
-    :math:`1 - \\alpha`, none of L lags exceeds the quantile of :math:`\\alpha/2L` (Bonferroni). The fit of a window
-    correlates its residuals by about the number of its parameters over that of its samples.
+    Correlation over less than half a period belongs to the noise. That of n samples of white noise has a standard
+    deviation of :math:`n^{-1/2}`: with the probability :math:`1 - \\alpha`, none of L lags exceeds the quantile of
+    :math:`\\alpha/2L` (Bonferroni). What is no more than the noise within a period counts if it is noticeable.
     """
     from scipy.fft import irfft, next_fast_len, rfft
 
-    if not residual.enough or not residual.noisy or residual.per_window < 2 * FEWEST_FOR_CURVE:
+    shortest = max(residual.lags, math.pi / residual.turn)
+    if not residual.enough or not residual.noisy or shortest > 0.5 * len(residual.samples.track):
         return None
-    whole, used = residual.on_grid()
-    lags, shortest = whole.size // 2, residual.lags
-    if shortest > lags:
-        return None
-    size, first = next_fast_len(whole.size + lags, real=True), int(shortest)
+    whole, used = residual.on_grid(of_whole_fit=True)
+    lags, first = whole.size // 2, math.ceil(shortest)
+    size = next_fast_len(whole.size + lags, real=True)
 
     def products(values: F8) -> F8:
         return np.asarray(irfft(np.abs(rfft(values, size)) ** 2, size)[: lags + 1])
@@ -89,10 +69,12 @@ def colour(residual: Residual) -> Outcome | None:
     enough = pairs > 0.25 * pairs[0]
     correlation = np.where(enough, sums / np.maximum(pairs, 1.0), 0.0) / (sums[0] / pairs[0])
     lag = first + int(np.argmax(np.abs(correlation[first:])))
-    white = normal_quantile(1.0 - ALARM_OF_A_TEST / lags) / math.sqrt(pairs[lag] or 1.0)
+    white = normal_quantile(1.0 - FALSE_ALARM / lags) / math.sqrt(pairs[lag] or 1.0)
     # With fewer pairs than samples the estimate may exceed 1, which a correlation cannot.
     strongest = max(-1.0, min(float(correlation[lag]), 1.0))
-    predictable = math.sqrt(abs(strongest) * sums[0] / pairs[0])
-    if abs(strongest) <= max(0.5, white) or predictable < NOTICEABLE * residual.amplitude:
+    rms = math.sqrt(float(sums[0] / pairs[0]))
+    small = rms < residual.noise and math.sqrt(abs(strongest)) * rms < NOTICEABLE * residual.amplitude
+    if abs(strongest) <= max(0.5, white) or small:
         return None
-    return Outcome("model_misfit", {"correlation": strongest, "lag_s": lag * residual.step_s})
+    larger = {"rms_m": rms, "noise_m": residual.noise} if rms > residual.noise else {}
+    return Outcome("model_misfit", {**larger, "correlation": strongest, "lag_s": lag * residual.step_s})

@@ -78,10 +78,15 @@ class Residual:
         """Whether there is noise, and not only rounding or coarse steps, which the finding "quantised" reports."""
         return self.noise > max(self.rounding, (self.samples.quantum or 0.0) / COARSE)
 
-    def on_grid(self) -> tuple[F8, F8]:
-        """Return the residual of all samples (n,), 0 where none was used, and 1 where one was used."""
+    def on_grid(self, *, of_whole_fit: bool = False) -> tuple[F8, F8]:
+        """Return the residual of all samples (n,), 0 where none was used, and 1 where one was used.
+
+        That of the whole fit includes what the windows follow and no model explains.
+        """
         whole, used = np.zeros((2, len(self.samples.track)))
         whole[self.rows], used[self.rows] = self.values, 1.0
+        if of_whole_fit:
+            whole[self.rows] += (self.fitted.waveform.residual - self.fitted.windows.residual)[self.rows]
         return whole, used
 
     def less(self, outcome: Outcome) -> Residual:

@@ -34,6 +34,7 @@ class FindingKind:
     why: tuple[str, ...] = ()
     details: tuple[str, ...] = ()
     advice: tuple[str, ...] = ("",)
+    states: tuple[str, ...] = ()
     figure: str = ""
     harm: str = "uncertainty"
     doubts: tuple[str, ...] = ()
@@ -73,7 +74,18 @@ def kinds() -> Mapping[str, FindingKind]:
 
 
 def _field(name: str, value: Any) -> Any:
-    if name in ("severity", "says", "why", "details", "advice", "doubts", "doubts_anyway", "about", "explains"):
+    if name in (
+        "severity",
+        "says",
+        "why",
+        "details",
+        "advice",
+        "states",
+        "doubts",
+        "doubts_anyway",
+        "about",
+        "explains",
+    ):
         return (value,) if isinstance(value, str) else tuple(value)
     return value
 

@@ -127,24 +127,14 @@ def solved_once(
     started = timer()
     run = integrator.run(problem, spacing_s, count)
     running_s = timer() - started
-    why = integrator.no_estimate(problem)
-    if why:
-        return Solution(
-            integrator=integrator,
-            parts=1,
-            problem=problem,
-            trajectory=run,
-            error=None,
-            velocity_error=None,
-            no_estimate=why,
-            running_s=running_s,
-        )
-    apart = (math.inf, math.inf)
-    with contextlib.suppress(DynamicsError):  # too long a step may overflow
-        apart = _difference(run, integrator.run(problem, 0.5 * spacing_s, 2 * count, every=2))
-    share, rounding = 2.0**integrator.order / (2.0**integrator.order - 1.0), rounding_error(problem, spacing_s * count)
-    error, velocity_error = (share * each + rounding for each in apart)
-    return Solution(integrator, 1, problem, run, error, velocity_error, running_s=running_s)
+    error = velocity_error = None
+    if not (why := integrator.no_estimate(problem)):
+        apart = (math.inf, math.inf)
+        with contextlib.suppress(DynamicsError):  # too long a step may overflow
+            apart = _difference(run, integrator.run(problem, 0.5 * spacing_s, 2 * count, every=2))
+        share, rounding = 1.0 / (1.0 - 0.5**integrator.order), rounding_error(problem, spacing_s * count)
+        error, velocity_error = (share * each + rounding for each in apart)
+    return Solution(integrator, 1, problem, run, error, velocity_error, why, running_s)
 
 
 def rounding_error(problem: Problem, seconds: float) -> float:

@@ -12,7 +12,7 @@ from pipeline.notice import Notice
 from springmass.commands.options import Json
 from springmass.commands.parameters import argument
 from springmass.errors import OK, ProgramError
-from springmass.terminal.printing import wrapped
+from springmass.terminal.printing import with_options, wrapped
 
 PAGE_WIDTH = 80
 EXPLANATION_INDENT = " " * 9
@@ -47,7 +47,7 @@ def _fields(code: str, kind: FindingKind) -> dict[str, object]:
         "symptom": kind.symptom,
         "meaning": kind.meaning,
         "cause": kind.cause,
-        "advice": usual_advice(code),
+        "advice": with_options(code, usual_advice(code)),
         "example": word(Notice(code, kind.example)).message,
         "figure": kind.figure,
     }
@@ -58,7 +58,7 @@ def _explained(code: str, kind: FindingKind) -> str:
     rows = [
         ("Meaning", kind.meaning),
         ("Cause", kind.cause),
-        ("Advice", usual_advice(code) or "Nothing needs doing."),
+        ("Advice", with_options(code, usual_advice(code)) or "Nothing needs doing."),
         ("Example", word(Notice(code, kind.example)).message),
     ]
     if kind.figure:

@@ -11,11 +11,7 @@ from cyclopts.argument import Argument
 from acquisition.errors import NeedsAnswer
 from acquisition.recordings.questions import Question
 from springmass.api.questions import is_given
-
-
-def option_of(name: str) -> str:
-    """Return the option for a keyword argument: ``--rate-hz`` for ``rate_hz``, ``--from`` for ``from_s``."""
-    return f"--{name.removesuffix('_s').replace('_', '-')}"
+from springmass.terminal.printing import option_of
 
 
 def quoted(word: str) -> str:

@@ -37,7 +37,7 @@ from springmass.commands.parameters import (
     option,
     output,
 )
-from springmass.commands.questions import option_of, option_words
+from springmass.commands.questions import option_words
 from springmass.errors import INTERNAL, INTERRUPTED, OK, SENSOR, UNREADABLE, ProgramError
 from springmass.loading.save import made_now
 from springmass.loading.scenes import ask_about, read_scene
@@ -52,6 +52,7 @@ from springmass.simulations.bench import EXAMPLE, REST_M, Release, bench_positio
 from springmass.stops import STOPS, EndReason
 from springmass.terminal.console import Console
 from springmass.terminal.keys import marks_by_keys
+from springmass.terminal.printing import option_of
 from springmass.terminal.progress_line import ProgressLine
 from springmass.terminal.style import style_of, watched
 from storage.errors import WriteFailed, one_line

@@ -166,7 +166,7 @@ def demand_one_spring(scenes: Sequence[tuple[str, Scene]]) -> None:
     missing = [name for name, scene in scenes if scene.bob_mass_kg is None]
     if missing:
         raise ProgramError(
-            f"compare needs the mass of every run's bob; no [bob] mass_kg for {', '.join(missing)}",
+            f"compare needs the mass of every run's bob; none is stated for {', '.join(missing)}",
             "give --scene FILE, one for all runs or one for each in their order",
             between=": ",
         )
@@ -227,16 +227,23 @@ def _period_words(compared: SpringComparison) -> list[str]:
         name: math.sqrt(d.estimates["spring_constant"].value / mass) * t / (2.0 * math.pi)
         for name, (t, mass, d) in swinging.items()
     }
+    springs = compared.comparison
+    of_run = {name: (k.value, u) for name, k, u in zip(springs.names, springs.each, springs.own_u, strict=True)}
     first, *others = sorted(swinging, key=lambda name: swinging[name][0])
     t, mass, _ = swinging[first]
     lines = []
     for name in others[-MOST_PERIODS:]:
         longer, heavier = swinging[name][0] / t - 1.0, math.sqrt(swinging[name][1] / mass) - 1.0
-        damped = 1e6 * (slowed[name] / slowed[first] - 1.0)
+        damped = slowed[name] / slowed[first] - 1.0
+        left, (k, u), (other_k, other_u) = longer - heavier - damped, of_run[name], of_run[first]
+        apart = abs(k - other_k) / math.hypot(u, other_u)
+        also = (
+            f", and {100.0 * left:+.2g} % is left, {apart:.1f} u of masses and periods" if left > 0.1 * longer else ""
+        )
         lines.append(
             f"The period of {name} is {100.0 * longer:.3g} % longer than that of {first}: the masses that swing, "
             f"{1e3 * swinging[name][1]:.5g} g and {1e3 * mass:.5g} g, explain {100.0 * heavier:+.3g} %, damping "
-            f"{damped:+.2g} ppm."
+            f"{1e6 * damped:+.2g} ppm{also}."
         )
     return lines
 

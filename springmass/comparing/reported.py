@@ -169,7 +169,9 @@ def _value(row: Reported, run: Run, others: Mapping[str, Run]) -> tuple[str, Not
         hypotheses += [(name, each) for each in _expected(run, row.name, _expected(other, "period")[0])[unweighed:]]
     for name, each in (*hypotheses, *(("agrees", each) for each in expected[:unweighed])):
         if _agrees(run, row, each):
-            return name, None, 1.0
+            nearest = min(expected, key=lambda x: abs(row.value - x.value))
+            alone = name == "agrees" and nearest is not ours and not unweighed
+            return "agrees without the mass of the spring" if alone else name, None, 1.0
     for power in POWERS:
         if any(_agrees(run, row, each, 10.0**power, ROUGHLY) for _, each in hypotheses):
             about["factor"] = f"{10 ** abs(power):,} times too {'small' if power > 0 else 'large'}"

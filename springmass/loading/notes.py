@@ -86,7 +86,7 @@ def about_of(recording: Path) -> About:
         marks = tuple((float(mark["t_s"]), str(mark["text"])) for mark in tables.get("marks", ()))
         notes = tuple(str(note) for note in tables.get("notes", ()))
     except SceneError as error:
-        raise ProgramError(error.problem, error.remedy) from error
+        raise ProgramError(error.problem, error.remedy, where=error.where) from error
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         demand = "notes are a list of texts, marks are [[marks]] with t_s and text"
         raise ProgramError(f"{path}: {demand}", "mend or remove the file") from error

@@ -90,7 +90,7 @@ def amended(scene: Scene, values: Amendments, *, where: str) -> Scene:
     try:
         return Scene.from_mapping(tables, where=where)
     except SceneError as error:
-        raise ProgramError(error.problem, error.remedy) from error
+        raise ProgramError(error.problem, error.remedy, where=error.where) from error
 
 
 def stated_keys(scene: Scene) -> str:

@@ -167,7 +167,7 @@ def _reported_words(compared: SpringComparison) -> str:
     """Return how many of the values that somebody printed agree, and which mistakes explain the others."""
     if not compared.reported:
         return ""
-    agree = sum(row.verdict == "agrees" for row in compared.reported)
+    agree = sum(row.verdict.startswith("agrees") for row in compared.reported)
     mistakes = [f for f in compared.findings if "reported" in kinds()[f.code].about]
     errors = [typeset(f.message) for f in mistakes if f.severity == "error"]
     text = " ".join([f"{agree} of {count(len(compared.reported), 'printed value')} agree.", *errors])

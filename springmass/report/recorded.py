@@ -92,4 +92,4 @@ def bench_words(scene: Scene) -> str:
     parts = [f"{words} {pretty(x)}" for words, name in _ON_THE_BENCH if (x := getattr(scene, name)) is not None]
     if scene.sensor_position is not None:
         parts.append(f"sensor {scene.sensor_position}")
-    return ", ".join(parts) if parts else "not stated; for the spring constant add --mass-kg KG"
+    return ", ".join(parts) if parts else "not stated; the spring constant needs the mass"

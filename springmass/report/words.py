@@ -134,7 +134,7 @@ def summary(analysis: Analysis) -> tuple[tuple[str, str], ...]:
         and analysis.scene.hangs_on_spring
         and analysis.track.unit == "m"
     ):
-        to_do += " For the spring constant, state the mass: --mass-kg KG."
+        to_do += " For the spring constant, state the mass."
     return (("Values", _values(analysis, motion)), ("How sure", _trust(analysis, greatest)), ("What to do", to_do))
 
 

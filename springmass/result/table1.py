@@ -131,7 +131,7 @@ def rows_and_needs(runs: Sequence[Analysis]) -> tuple[TableRow, ...]:
     return *rows[:at], row, *rows[at:]
 
 
-NEEDS_MASS = "needs the mass: --mass-kg KG"
+NEEDS_MASS = "needs the mass"
 
 
 def _needs_mass(run: Analysis) -> bool:

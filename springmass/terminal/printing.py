@@ -22,6 +22,7 @@ RUNS_NAMED = 5  # maximum number of runs that a line names
 WARNINGS_SHOWN = 3  # number of warnings shown without --full
 NARROW = 80  # maximum width of wrapped warnings, columns
 WARNING_LINES = 3
+OPTION_OF_MASS = ": --mass-kg KG"
 FINDING_INDENT = " " * 8
 
 
@@ -57,12 +58,25 @@ def _finding_line(finding: Mapping[str, Any], written: Callable[[str], str]) -> 
     severity, advice = finding["severity"], finding.get("advice", "")
     message = written(finding["message"])
     if advice and severity != "info":
-        message += f"{'' if message[-1:] in '.!?' else '.'} {advice}"
+        message += f"{'' if message[-1:] in '.!?' else '.'} {with_options(finding['code'], advice)}"
     lines = wrapped(f"{_MARKS[severity]} {finding['code']}: {message}", FINDING_INDENT, NARROW).splitlines()
     if severity == "error" or len(lines) <= WARNING_LINES:
         return "\n".join(lines)
     last = lines[WARNING_LINES - 1]
     return "\n".join([*lines[: WARNING_LINES - 1], f"{last[: NARROW - 4].rstrip(' .,;')} ..."])
+
+
+def option_of(name: str) -> str:
+    """Return the option for a keyword argument: ``--rate-hz`` for ``rate_hz``, ``--from`` for ``from_s``."""
+    return f"--{name.removesuffix('_s').replace('_', '-')}"
+
+
+def with_options(code: str, advice: str) -> str:
+    """Return what to do about a finding, with the options that state the values of which it speaks."""
+    from pipeline.findings.finding import kinds
+
+    options = [f"--set {each}" if "." in each else option_of(each) for each in kinds()[code].states]
+    return f"{advice.removesuffix('.')} ({', '.join(options)})." if options else advice
 
 
 def shared_findings_text(runs: Mapping[str, Sequence[Mapping[str, Any]]], written: Callable[[str], str]) -> str:
@@ -162,7 +176,8 @@ def text_table(names: Sequence[str], runs: Sequence[Analysis], style: TerminalSt
         cells = [tuple(form(x, style) for x in row.estimates) for row in rows]
         widest = max([8, *(len(cell) for row in cells for cell in row)])
         if len(names) == 1:
-            widest = max([widest, *(len(row.note) for row in rows if len(row.note) <= room - left)])
+            notes = [len(row.note + OPTION_OF_MASS) for row in rows if row.note]
+            widest = max([widest, *(note for note in notes if note <= room - left)])
         if room + 3 - len(names) * (widest + 3) >= left:
             break
     # Otherwise the names of quantities wrap, and if that does not suffice, further blocks follow.
@@ -170,7 +185,8 @@ def text_table(names: Sequence[str], runs: Sequence[Analysis], style: TerminalSt
     left = min(left, max(LEAST_NAME_WIDTH, room + 3 - together * (widest + 3)))
     for i, row in enumerate(rows):
         if row.note:
-            cells[i] = (row.note if len(row.note) <= widest else "no mass",) * len(names)
+            note = row.note + OPTION_OF_MASS
+            cells[i] = (note if len(note) <= widest else "no mass",) * len(names)
     heads = [shortened(readable(name, style), widest) for name in names]
     blocks = []
     for first in range(0, len(names), together):

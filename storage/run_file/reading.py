@@ -247,7 +247,7 @@ class RunFile:
 
 
 def _demand_hdf5(path: Path) -> None:
-    remedy = "name a run file; springmass formats FILE shows what a file is"
+    remedy = "name a run file of springmass"
     try:
         with open_regular(path) as stream:
             head = stream.read(len(layout.HDF5_MAGIC))

@@ -148,18 +148,6 @@ def test_standard_input_is_read(cli: Cli, data: Path, monkeypatch: pytest.Monkey
     assert cli("analyse", "-", "--json").complaint.startswith("springmass: <stdin>: ")
 
 
-@pytest.mark.trials
-def test_a_lab_report_is_written(cli: Cli, data: Path, tmp_path: Path) -> None:
-    """It includes every figure that is written next to it, and letters that each version of LaTeX knows."""
-    done = cli("analyse", data / FILES[1], "--accuracy", "fast", "--template", "latex", "-o", tmp_path)
-    assert done.code == 0, done.err
-    (document,) = tmp_path.rglob("lab-report.tex")
-    text = document.read_text("utf-8")
-    assert text.count(r"\begin{figure}") == text.count(r"\includegraphics") > 2
-    assert text.count("{") == text.count("}")
-    assert text.isascii()
-
-
 def test_recordings_and_channels_have_their_own_results(cli: Cli, tmp_path: Path) -> None:
     """A text keeps its whole name, a run file its stem, and a chosen channel follows; no report replaces another."""
     t = np.arange(1000) / 100

@@ -249,7 +249,7 @@ def test_a_clock_that_was_set_forward_is_a_jump(read: Callable[..., Any], tmp_pa
     (said,) = [each for each in result["findings"] if each["code"] == "time_jump"]
     assert f"{by_s:.0f} s" in said["message"]
     assert "lines 1001 and 1002" in said["message"]
-    assert "--from" in said["advice"]
+    assert "after it" in said["advice"]
     read(tmp_path / "run.csv", "--to", "9.9")
 
 

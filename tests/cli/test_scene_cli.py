@@ -54,7 +54,7 @@ def test_a_check_asks_about_values_and_refuses_what_cannot_be(cli: Cli, tmp_path
     """Grams are asked about, an unknown key is exit code 2."""
     path = tmp_path / "bench.toml"
     path.write_text("[bob]\nmass_kg = 217.6\n")
-    assert "mass_kg" in cli("scene", "--check", path).err
+    assert "mass of the bob" in cli("scene", "--check", path).err
     path.write_text("[bob]\nmass_g = 217.6\n")
     assert cli("scene", "--check", path).code == 2
 

@@ -217,6 +217,7 @@ OUTSIDE = """() => {
     const head = e.closest('thead');
     if (head && getComputedStyle(head).position === 'absolute') continue;  // for screen readers alone
     if (e.closest('svg') || box.width === 0) continue;
+    if (e.closest('[tabindex="0"]') && matchMedia('screen').matches) continue;  // a wide table that can be scrolled
     if (box.left < -0.5 || box.right > wide + 0.5) found.push('outside ' + name(e));
     if (style.overflowX !== 'visible' && e.scrollWidth > e.clientWidth + 1) found.push('cut off ' + name(e));
   }

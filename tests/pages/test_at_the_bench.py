@@ -115,13 +115,17 @@ def test_two_viewers_and_one_controller(viewers: tuple[Any, Page, str], browser:
 
 
 def test_from_opening_to_the_run_file(record: Callable[..., Any], context: BrowserContext) -> None:
-    """Open, see the motion, mark, stop: the mark is shown once the log has it, and the run file holds all of it."""
+    """Open, see the motion, mark, stop: a mark is shown once the log has it, and the run file holds all of it.
+
+    A script gets the same as messages, as docs/reference/page-messages.md has them, and may mark.
+    """
     program = record()
+    mark_by_script(program.address)
     page = opened(context, program.address, PHASE.format(phase="recording"))
     assert page.inner_text("#source") == "SIMULATED"
     press(page, "m")
     answer(page, "lamp on")
-    page.wait_for_function("() => state.marks.length === 1")
+    page.wait_for_function("() => state.marks.length === 2")
     page.wait_for_function(MOVES)
     assert page.evaluate("motion.estimates.period.value") == pytest.approx(0.7573, abs=0.01)
     press(page, "s")
@@ -132,7 +136,7 @@ def test_from_opening_to_the_run_file(record: Callable[..., Any], context: Brows
     assert program.ended() == 0
     page.wait_for_function("() => !document.getElementById('trouble').hidden")
     with open_run(program.out) as run:
-        assert [mark["text"] for mark in run.provenance["marks"]] == ["lamp on"]
+        assert [mark["text"] for mark in run.provenance["marks"]] == ["from a script", "lamp on"]
         (ended,) = [event["facts"] for event in run.provenance["events"] if event["kind"] == "ended"]
         distance = run.samples().distance
     assert ended["by"] == "the page"
@@ -141,10 +145,9 @@ def test_from_opening_to_the_run_file(record: Callable[..., Any], context: Brows
     assert distance.size - shown.size < 50
 
 
-def test_messages_are_the_samples(record: Callable[..., Any]) -> None:
-    """As docs/reference/page-messages.md has them; a script may mark."""
-    program = record()
-    with Client(program.address).socket() as run:
+def mark_by_script(address: str) -> None:
+    """Take samples as messages, in order and without a gap, and mark."""
+    with Client(address).socket() as run:
         hello = json.loads(run.recv())
         assert (hello["type"], hello["version"], hello["simulated"]) == ("hello", 2, True)
         count = 0
@@ -159,7 +162,6 @@ def test_messages_are_the_samples(record: Callable[..., Any]) -> None:
         while not (isinstance(message, str) and json.loads(message).get("marks")):
             message = run.recv()
         assert json.loads(message)["marks"][0][1] == "from a script"
-    program.end()
 
 
 @pytest.mark.trials

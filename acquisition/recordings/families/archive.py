@@ -99,6 +99,11 @@ def members(path: str, data: bytes) -> Iterator[tuple[str, bytes]]:
         raise foreign_format(path, b"") or unread from error
 
 
+def is_one_recording(data: bytes) -> bool:
+    """Return whether the files of an archive belong together; phyphox packs its sensors with a file about the phone."""
+    return b"meta/device.csv" in data
+
+
 def _is_wanted(file: zipfile.ZipInfo) -> bool:
     """Return whether a file is none that an operating system adds."""
     if not file.filename:

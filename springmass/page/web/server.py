@@ -14,7 +14,7 @@ from typing import Any
 
 import uvicorn
 from starlette.applications import Starlette
-from starlette.responses import FileResponse, PlainTextResponse, Response
+from starlette.responses import FileResponse, HTMLResponse, PlainTextResponse, Response
 from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -188,6 +188,12 @@ class Server:
         return self._frames[key]
 
 
+def page_of(name: str) -> HTMLResponse:
+    """Return a page: the head that all pages share, with the name of its style sheet, and its body."""
+    head, body = ((PAGE_FILES / f"{each}.html").read_text("utf-8") for each in ("head", name))
+    return HTMLResponse(head.replace("PAGE", name) + body)
+
+
 def application(page: PageState, share: str = "", polled: Callable[[int], None] = lambda _: None) -> Starlette:
     """Return the page as an ASGI application without access control.
 
@@ -197,7 +203,7 @@ def application(page: PageState, share: str = "", polled: Callable[[int], None] 
     server = Server(page, share, polled)
 
     async def main(_: Any) -> Response:
-        return FileResponse(PAGE_FILES / "page.html")
+        return page_of("page")
 
     async def report(_: Any) -> Response:
         if page.after is None or page.after.report is None:

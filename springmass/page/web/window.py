@@ -19,7 +19,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from springmass.loading.load import sample_data
 from springmass.page.web.security import ACT, Access
-from springmass.page.web.server import PAGE_FILES, server_of, static_files
+from springmass.page.web.server import page_of, server_of, static_files
 from springmass.page.window.cards import Cards, NotTaken
 from springmass.page.window.recording import ports
 
@@ -108,7 +108,7 @@ def application(window: Window, cards: Cards, life: Callable[[Starlette], Any]) 
     """Return the window as an ASGI application without access control."""
 
     async def main(_: Request) -> Response:
-        return FileResponse(PAGE_FILES / "window.html")
+        return page_of("window")
 
     async def changing(request: Request, work: Callable[[], Any]) -> Response:
         """Do what changes something only for the page itself: its cookie, its origin and its header."""

@@ -12,21 +12,17 @@ from pipeline.bench.typed import scales_of
 from pipeline.errors import SceneError
 from springmass.typeset import page_unit
 
-FIELDS: Mapping[str, tuple[str, str, str]] = {
-    "bob.mass_kg": ("Mass of the bob", "g", "Everything that hangs on the spring, a disc included. It gives k."),
-    "spring.mass_kg": ("Mass of the spring", "g", "Weigh it alone. About a third of it swings along with the bob."),
-    "disc.diameter_m": ("Diameter of a disc", "cm", "A disc on the bob makes drag. Its size gives Re and the drag."),
-    "air.temperature_c": ("Air temperature", "C", "It sets the speed of sound, and so the scale of a rangefinder."),
-    "air.pressure_pa": ("Air pressure", "hPa", "Where you are, not reduced to sea level. Empty means 1013 hPa."),
-    "air.relative_humidity": ("Humidity of the air", "%", "It changes the speed of sound a little. Empty means 50 %."),
-    "pendulum.length_m": ("Length of a pendulum", "cm", "From the pivot to the middle of the bob. It gives g."),
-    "sensor.clock_ppm": (
-        "Error of the clock",
-        "ppm",
-        "How much the clock of the sensor is wrong; 0 ± 20 if it may be 20 ppm.",
-    ),
+FIELDS: Mapping[str, tuple[str, str]] = {
+    "bob.mass_kg": ("g", "Everything that hangs on the spring, a disc included. It gives k."),
+    "spring.mass_kg": ("g", "Weigh it alone. About a third of it swings along with the bob."),
+    "disc.diameter_m": ("cm", "A disc on the bob makes drag. Its size gives Re and the drag."),
+    "air.temperature_c": ("C", "It sets the speed of sound, and so the scale of a rangefinder."),
+    "air.pressure_pa": ("hPa", "Where you are, not reduced to sea level. Empty means 1013 hPa."),
+    "air.relative_humidity": ("%", "It changes the speed of sound a little. Empty means 50 %."),
+    "pendulum.length_m": ("cm", "From the pivot to the middle of the bob. It gives g."),
+    "sensor.clock_ppm": ("ppm", "How much the clock of the sensor is wrong; 0 ± 20 if it may be 20 ppm."),
 }
-"""Label, first unit and explanation of every quantity of the form, by table and key of a scene."""
+"""First unit and explanation of every quantity of the form, by table and key of a scene."""
 SENSOR_PLACE = "sensor.position"
 _UNIT_WORDS = {"C": "°C", "F": "°F"}
 _COMMA = re.compile(r"(?<=\d),(?=\d)")
@@ -45,7 +41,7 @@ def scene_of(before: Scene, typed: Mapping[str, Any]) -> tuple[Scene, dict[str, 
         try:
             scene = Scene.from_mapping({each: content for each, content in tables.items() if content})
         except SceneError as error:
-            errors[name] = re.sub(r"^scene: \[\w+\] \w+:? ", "", str(error))
+            errors[name] = str(SceneError(error.problem, error.remedy))
     return scene, errors
 
 
@@ -62,7 +58,7 @@ def form_of(scene: Scene, typed: Mapping[str, Any], errors: Mapping[str, str]) -
     """Return the fields of the form, filled with what was typed, or else with the scene."""
     doubts = {".".join(PLACES[slip.attribute]): slip.words for slip in slips(scene)}
     fields: list[dict[str, Any]] = []
-    for name, (label, unit, words) in FIELDS.items():
+    for name, (unit, words) in FIELDS.items():
         table, _, key = name.partition(".")
         quantity = BENCH_KEYS[table, key]
         scales = {each: scale for each, scale in scales_of(quantity.unit).items() if each != "degC" and each != "degF"}
@@ -72,7 +68,12 @@ def form_of(scene: Scene, typed: Mapping[str, Any], errors: Mapping[str, str]) -
             value, u = (known.value - scale.zero) / scale.factor, known.u / scale.factor
             shown |= {"text": f"{value:.10g}", "u": f"{u:.6g}" if u else ""}
         units = [{"value": each, "label": _UNIT_WORDS.get(each) or page_unit(each)} for each in scales]
-        about = {"name": name, "label": label, "help": words, "units": units}
+        about = {
+            "name": name,
+            "label": f"{quantity.label[:1].upper()}{quantity.label[1:]}",
+            "help": words,
+            "units": units,
+        }
         wrong = {"error": errors.get(name, ""), "doubt": doubts.get(name, "")}
         fields.append(about | shown | typed.get(name, {}) | wrong)
     place = scene.sensor_position or ""

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from acquisition.errors import visible
-from acquisition.recordings.families.archive import members
+from acquisition.recordings.families.archive import is_one_recording, members
 from acquisition.recordings.identify import read_bytes, sniff
 from acquisition.recordings.questions import Missing
 from acquisition.recordings.reading import value_of
@@ -35,7 +35,7 @@ from springmass.errors import ProgramError
 from springmass.loading.options import AnalysisOptions
 from springmass.loading.scenes import read_scene
 from springmass.page.window.bench import form_of, scene_of
-from springmass.page.window.contents import asked, compared_of, drawn, in_fields, judged, opened, results_of
+from springmass.page.window.contents import asked, compared_of, drawn, judged, opened, results_of
 from springmass.report.recorded import notes_of
 from springmass.report.write import write_report
 from springmass.result.output_names import numbered, plain_name
@@ -45,7 +45,6 @@ from storage.atomic import write_whole
 
 Request = Mapping[str, Any]
 Answer = dict[str, Any]
-PHYPHOX = b"meta/device.csv"
 
 
 class Opened:
@@ -113,7 +112,7 @@ class Opened:
         run, _ = self.run(request["card"])
         table = _table(Path(request["into"]), REPORTED_COLUMNS, [[run.name, *row] for row in request["rows"]])
         rows, findings = judge(read_reported(table, [run]), [run])
-        said = [in_fields(" ".join((f.message, f.details))).strip() for f in findings]
+        said = [f"{f.message} {f.details}".strip() for f in findings]
         yield {"judged": judged(rows), "findings": said}
 
     def compare(self, request: Request) -> Iterator[Answer]:
@@ -122,6 +121,8 @@ class Opened:
         points = _table(folder, request["columns"], rows) if rows else None
         names = numbered([card["name"] for card in request["cards"]])
         runs = [self.run(card)[0].named(name) for name, card in zip(names, request["cards"], strict=True)]
+        if any(run.scene.bob_mass_kg is None for run in runs):
+            raise ProgramError("a comparison needs the mass of every bob", "type it on its card")
         if len(runs) > 1:
             compared = compare_runs(runs, static=points)
             parts = [overlay(names, [run.analysis for run in runs]), comparison(compared.comparison)]
@@ -182,15 +183,15 @@ def answers(opened_here: Opened, request: Request) -> Iterator[Answer]:
 def _why(failed: Failed, where: str) -> Answer:
     """Return a question, or why there are no results, in words without the path of our copy.
 
-    ``archive`` says that its files may be recordings by themselves; those of phyphox's export belong together.
+    ``archive`` says that its files may be recordings by themselves.
     """
     asks, archive = failed.question, attempted(failed.task, partial(sniff, where)) == "zip"
     if asks is not None:
-        several = archive and Missing.RUN in asks.question.missing and PHYPHOX not in read_bytes(where)
+        several = archive and Missing.RUN in asks.question.missing and not is_one_recording(read_bytes(where))
         return {"question": asked(asks), "archive": several}
     error, folder = failed.error, f"{Path(where).parent}{os.sep}" if where else ""
     problem, remedy = (visible(text.replace(folder, "") if folder else text) for text in (error.problem, error.remedy))
-    return {"problem": problem, "remedy": in_fields(remedy), "archive": archive}
+    return {"problem": problem, "remedy": remedy, "archive": archive}
 
 
 def main() -> None:

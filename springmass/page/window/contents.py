@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -14,7 +13,6 @@ from springmass.charts.run import charts_of, recording
 from springmass.comparing.comparison import SpringComparison, comparison_words
 from springmass.comparing.reported import Reported
 from springmass.loading.loaded import Loaded
-from springmass.page.window.bench import FIELDS
 from springmass.report.html import tables_of
 from springmass.report.recorded import bench_words, date_words, notes_of
 from springmass.report.words import method, summary
@@ -30,37 +28,7 @@ LABELS = {
     Missing.TIME_UNIT: "Unit of the times",
     Missing.UNIT: "Unit",
 }
-FIELD_OF = {
-    "unit": "Unit",
-    "time-unit": "Unit of the times",
-    "time": "Column of times",
-    "rate-hz": "Rate in samples per second",
-    "from": "From",
-    "to": "To",
-    "law": "Law of damping",
-    "mass-kg": "Mass of the bob",
-    "clock-ppm": "Error of the clock",
-} | {place: label for place, (label, *_) in FIELDS.items()}
-"""The field of the window that stands for an option of the command line, or for a key of a scene."""
-_TYPED_WORDS = re.compile(
-    r"--set (?P<key>\w+\.\w+)=\S+(?<!\.)|--(?P<option>[a-z]+(?:-[a-z]+)*)(?: KG| any)?|\[(?P<table>\w+)\] (?P<name>\w+)"
-)
 OWN_FORMATS = {"run": "run file of springmass", "wire": "log of a recording"}
-
-
-def in_fields(text: str) -> str:
-    """Return an advice with the fields of the window in place of options of a command line and keys of a scene.
-
-    >>> in_fields("State the mass: --mass-kg KG."), in_fields("No u: [bob] mass_kg. See --from 1.5 --to 2.")
-    ('State the mass: “Mass of the bob”.', 'No u: “Mass of the bob”. See “From” 1.5 “To” 2.')
-    """
-
-    def field(found: re.Match[str]) -> str:
-        name = found["key"] or found["option"] or f"{found['table']}.{found['name']}"
-        return f"“{FIELD_OF.get(name, name)}”"
-
-    text = text.replace(" as in --mass-kg 0.2007+/-0.0001, or as u in the scene", " in the field after ±")
-    return _TYPED_WORDS.sub(field, text.replace(" of analyse", ""))
 
 
 def opened(loaded: Loaded) -> dict[str, Any]:
@@ -121,7 +89,7 @@ def results_of(run: Run) -> dict[str, Any]:
                 "symbol": row.page_symbol,
                 "value": pretty(x) if (x := row.estimates[0]) is not None else "",
                 "cells": cells(x),
-                "note": in_fields(row.note),
+                "note": row.note,
                 "grade": table["grades"][row.name].grade if row.name in table["grades"] else "",
                 "why": table["grades"][row.name].why if row.name in table["grades"] else "",
             }
@@ -130,12 +98,9 @@ def results_of(run: Run) -> dict[str, Any]:
         "sound": table["all_sound"],
         "graded": bool(grades),
         "estimates": run.result["estimates"],
-        "summary": [[title, in_fields(text)] for title, text in summary(analysis)],
-        "findings": [
-            {**notice, **{part: in_fields(notice[part]) for part in ("message", "advice", "details")}}
-            for notice in [*notices["warnings"], *notices["notes"]]
-        ],
-        "method": [in_fields(text) for text in method(analysis)],
+        "summary": summary(analysis),
+        "findings": [*notices["warnings"], *notices["notes"]],
+        "method": method(analysis),
         "bench": bench_words(analysis.scene).partition(";")[0],
         "law": run.law,
         "charts": drawn(charts),
@@ -158,7 +123,7 @@ def compared_of(compared: SpringComparison, charts: Mapping[str, Chart]) -> dict
     return {
         "verdict": typeset(" ".join(texts)),
         "rows": rows,
-        "findings": [in_fields(finding.advice) for finding in compared.findings if finding.advice],
+        "findings": [finding.advice for finding in compared.findings if finding.advice],
         "charts": drawn(charts),
     }
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
-import sys
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -16,7 +14,6 @@ import pytest
 from pipeline.analyse import Analysis, analyse
 from pipeline.bench.scene import Scene
 from pipeline.track import Quality, Track
-from sample_data import generate
 
 FOLDER = Path(__file__).resolve().parents[3] / "sample_data"
 NAMES = ("undamped", "damped", "clipped", "cropped", "sixty_hz")
@@ -83,12 +80,6 @@ def test_every_truth_is_within_three_uncertainties(run: Sample) -> None:
     assert max(abs(z) for z in pulls.values()) <= 3.0, pulls
 
 
-def test_true_law_is_admissible(run: Sample) -> None:
-    """The law that made the recording is not rejected."""
-    assert run.truth["law"] in run.result.damping.admissible
-    assert "none" not in run.result.damping.admissible
-
-
 def test_false_echoes_are_flagged(run: Sample) -> None:
     """At least 99 % of the listed false echoes end flagged, and little else but heavy tails."""
     echoes = run.truth["false_echo_rows"]
@@ -106,25 +97,3 @@ def test_clipped_run() -> None:
     assert run.result.samples.plateaus == (pytest.approx(run.truth["clip_limit_m"], abs=2e-4),)
     assert run.share_flagged("clipped_rows", Quality.CLIPPED) >= 0.98
     assert run.result.quality["clipped"] <= 1.02 * len(run.truth["clipped_rows"])
-
-
-def test_no_error_and_no_false_alarm(run: Sample) -> None:
-    """What the simulation does not hold is not found: no drift, no bend, no misfit."""
-    codes = {finding.code for finding in run.result.findings}
-    assert not codes & {"rest_drift", "amplitude_dependent_frequency", "model_misfit", "no_oscillation", "quantised"}
-    assert "error" not in {finding.severity for finding in run.result.findings}
-
-
-def test_files_regenerate_byte_for_byte() -> None:
-    """Every file is made again byte for byte, and nothing simulated lies there that is not made."""
-    made = generate.every_file()
-    assert {name: (FOLDER / name).read_bytes() for name in made} == made
-    kept = {path.name for pattern in ("*.txt", "*.json", "*.toml") for path in FOLDER.glob(pattern)}
-    assert kept == set(made)
-
-
-def test_generator_shares_no_code_with_the_project() -> None:
-    """The generator imports the standard library and numpy only."""
-    source = (FOLDER / "generate.py").read_text("utf-8")
-    imported = set(re.findall(r"^(?:from|import) (\w+)", source, re.MULTILINE))
-    assert imported <= {*sys.stdlib_module_names, "numpy"}

@@ -162,7 +162,7 @@ def test_table_1_is_ready_for_a_spreadsheet(page: str, result: dict[str, Any]) -
 
 def test_correlations_are_shown_as_a_triangle(page: str, result: dict[str, Any]) -> None:
     """The page has the correlations of the JSON to two decimals: of the last row, that of γ and β."""
-    rows = re.findall(r"<tr>.*?</tr>", page.partition('<table class="correlations">')[2].partition("</table>")[0], re.S)
+    rows = re.findall(r"<tr>.*?</tr>", page.partition('<table class="correlations')[2].partition("</table>")[0], re.S)
     shown = [[float(x.replace("−", "-")) for x in re.findall(r"<td[^>]*>([^<]*)</td>", row)] for row in rows]
     names, matrix = result["correlations"]["names"], result["correlations"]["matrix"]
     assert [len(row) for row in shown] == list(range(len(rows)))
