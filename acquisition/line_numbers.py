@@ -169,12 +169,12 @@ def find_distance(text: str, candidates: Sequence[Number], unit: str = "") -> Nu
     return best
 
 
-def _agree(one: Number, other: Number) -> bool:
+def _agree(first: Number, second: Number) -> bool:
     """Return whether two numbers are the same distance in two units; two in one unit are of two sensors."""
-    if not one.unit or not other.unit or one.unit == other.unit:
+    if not first.unit or not second.unit or first.unit == second.unit:
         return False
-    a, b = LENGTHS_M[one.unit], LENGTHS_M[other.unit]
-    return abs(one.value * a - other.value * b) <= one.step * a + other.step * b
+    a, b = LENGTHS_M[first.unit], LENGTHS_M[second.unit]
+    return abs(first.value * a - second.value * b) <= first.step * a + second.step * b
 
 
 def _blank(match: re.Match[str]) -> str:

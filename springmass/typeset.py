@@ -48,7 +48,8 @@ _UNITS = {
     "degC": _Written(r"\degreeCelsius", "°C"),
     "Pa": _Written(r"\pascal"),
 }
-_SUPERSCRIPT = str.maketrans("-0123456789n", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ")
+_RAISED = dict(zip("-0123456789n", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ", strict=True))
+_SUPERSCRIPT = str.maketrans(_RAISED)
 _POWER = re.compile(r"\^(?:\(([\dn-]+)\)|([\dn-]+))")
 NOTHING = "-"
 MANY_FREEDOM = 1e6  # degrees of freedom from which they are written as infinite
@@ -227,7 +228,7 @@ _TEX_MATH = {
     **{letter: "\\" + unicodedata.name(letter).split()[-1].capitalize() for letter in "ΔΩ"},
     **{lowered: f"_{digit}" for digit, lowered in enumerate("₀₁₂₃₄₅₆₇₈₉")},
 }
-_SUPERSCRIPTS = {raised: plain for plain, raised in zip("-0123456789n", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ", strict=True)}
+_SUPERSCRIPTS = {raised: plain for plain, raised in _RAISED.items()}
 
 
 def tex_words(text: str) -> str:

@@ -120,8 +120,7 @@ def find_bend(
     if small:
         law, omega = next(iter(small.items()))
         fit, u_choice = lines[law], max(abs(other - omega) for other in small.values())
-        wider = spread.correlation * max(1.0, fit.chi2 / max(count - fit.values.size, 1))
-        u = math.sqrt(float(fit.covariance[1, 1]) * wider)
+        u = math.sqrt(float(fit.covariance[1, 1]) * fit.widening(spread.correlation))
         estimate = Estimate(omega, math.hypot(u, u_choice), "rad/s") if omega > 0.0 else None
     apart = max(abs(omega - mean) for omega in (*small.values(), *first))
     return Bend(best, tables[best], rivals, u_choice, apart), lines[best], estimate

@@ -97,7 +97,7 @@ def _at_rest(windows: Windows, total: F8, table: SwingTable, length_m: float, un
         omega = float(line.values[1])
     more = solve_weighted(np.column_stack([columns, square])[kept], total[kept], spread.u[kept])
     count = float(np.count_nonzero(kept))
-    widened, apart = spread.correlation * max(1.0, line.chi2 / max(count - 2.0, 1.0)), 0.0
+    widened, apart = line.widening(spread.correlation), 0.0
     if (line.chi2 - more.chi2) / spread.correlation - math.log(count / spread.correlation) > VERY_STRONG:
         bend, law = float(more.values[2]) * float(np.max(size)) ** 2, omega * (1.0 - float(np.min(relative)))
         if abs(bend) > NEGLIGIBLE * law:

@@ -27,6 +27,10 @@ class Line:
     residual: F8  # (n,)
     chi2: float
 
+    def widening(self, correlation: float) -> float:
+        """Return the factor of the covariance if several points count as one, and chi-square per freedom exceeds 1."""
+        return correlation * max(1.0, self.chi2 / max(self.residual.size - self.values.size, 1))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scatter:

@@ -79,12 +79,12 @@ class Agreement:
     mean: Estimate | None  # over benches, with the scatter between them in its uncertainty; None: no common value
     # within, between: standard deviation of runs at one bench, and additional standard deviation between benches.
     # ``within`` is NaN if no bench has two runs, and ``between`` is NaN if there is only one bench.
-    within: float
-    between: float
-    stated: float  # root mean square of the standard uncertainties of the runs
+    within: float = math.nan
+    between: float = math.nan
+    stated: float = math.nan  # root mean square of the standard uncertainties of the runs
     # runs, benches: numbers of runs and benches.
-    runs: int
-    benches: int
+    runs: int = 0
+    benches: int = 0
     # chi2, dof: chi-square and degrees of freedom of the means of the benches, with the scatter within benches.
     chi2: float = math.nan
     dof: int = 0

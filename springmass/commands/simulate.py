@@ -13,7 +13,6 @@ from typing import Annotated, Literal
 from acquisition.errors import visible
 from pipeline.quantities import EFFECTS
 from pipeline.results.effects import Effect
-from pipeline.simulation.band import Band
 from springmass.commands.given import GivenOptions
 from springmass.commands.options import FiguresOption, FileArgument, Json, Overwrite, ReadPairs
 from springmass.commands.parameters import Finite, Positive, Whole, flag, option, output
@@ -97,7 +96,7 @@ def simulate(
         smaller = f"take --dt {error.limit} or less, " if error.limit else "take "
         remedy = f"{smaller}--method {error.other}, or --force to run it all the same"
         raise ProgramError(error.problem, remedy, where=f"{where}: ") from error
-    print(_described(simulation, full=full, given=tolerance is not None), file=say)
+    print(_described(simulation, full=full), file=say)
     made = run_file
     if run_file is not None:
         from springmass.simulations.run_files import write_readings
@@ -117,8 +116,8 @@ def simulate(
     return OK
 
 
-def _described(simulation: Simulation, *, full: bool, given: bool) -> str:
-    """Return the lines about a simulation; ``given`` is whether its tolerance was an option."""
+def _described(simulation: Simulation, *, full: bool) -> str:
+    """Return the lines about a simulation, the expert ones only with ``full``."""
     lines, over = [], simulation.against
     rows = [("", "predicted", "measured", "difference / u")]
     for row in beside_measured(simulation):
@@ -130,30 +129,21 @@ def _described(simulation: Simulation, *, full: bool, given: bool) -> str:
         lines += [f"against the run  {left}", *(deviation_text(over) if full else [])]
     lines.append(f"prediction       {_predicted(simulation)}")
     if full:
-        tolerance = _tolerance(simulation.tolerance, simulation.band, given=given)
-        band = wrapped(f"band             {simulation.of_band}", " " * 17)
-        lines += [band, _before(tolerance, simulation.effects)]
+        lines += [wrapped(f"band             {simulation.of_band}", " " * 17), *_acting(simulation.effects)]
+        if simulation.tolerance is not None:
+            lines.append(f"tolerance        {simulation.tolerance:g} of the amplitude")
     lines += [_after(simulation, full=full), *map(_grown, simulation.growths)]
     return "\n".join(lines)
 
 
-def _tolerance(tolerance: float | None, band: Band | None, *, given: bool) -> str:
-    """Say what the tolerance is, and where it comes from."""
-    if tolerance is None:
-        return ""
-    words = f"tolerance        {tolerance:g} of the amplitude"
-    of_band = "the default" if band is None else f"a hundredth of the band, {band.relative_u:.1g} of the amplitude"
-    return words if given else f"{words}: {of_band}"
-
-
-def _before(tolerance: str, effects: Sequence[Effect]) -> str:
-    """Return the effects that act, and the tolerance."""
+def _acting(effects: Sequence[Effect]) -> list[str]:
+    """Return the effects with their sizes, and whether each is in the equation."""
     lines = ["effects          change of the motion, of the amplitude"]
     for effect in effects:
         size = "" if effect.predicted is None else f"{effect.predicted:.2g}"
         mark = "in " if effect.included else "out"
         lines.append(wrapped(f"  {mark}  {EFFECTS[effect.name]:<38} {size:>8}  {effect.why}", " " * 56))
-    return "\n".join([*lines, *([wrapped(tolerance, " " * 17)] if tolerance else [])])
+    return lines
 
 
 def _after(simulation: Simulation, *, full: bool) -> str:

@@ -78,18 +78,7 @@ def _agreement(quantity: str, name: str, group: Sequence[CourseRun]) -> Agreemen
     """Return the agreement of a group's good runs, without a mean if they have no common value."""
     called = _NAMES[quantity]
     if not group:
-        why = "all its runs are among those that differ"
-        return Agreement(
-            quantity=called,
-            group=name,
-            mean=None,
-            within=math.nan,
-            between=math.nan,
-            stated=math.nan,
-            runs=0,
-            benches=0,
-            why=why,
-        )
+        return Agreement(called, name, mean=None, why="all its runs are among those that differ")
     values = [getattr(run, quantity) for run in group]
     agreed = agreement(called, name, values, [run.bench for run in group])
     scatter = max(x for x in (agreed.within, agreed.between, 0.0) if not math.isnan(x))

@@ -25,6 +25,7 @@ from springmass.result.advice import SEVERITY_WORDS, notices_of
 from springmass.result.budget_tables import budgets_of, correlations_of
 from springmass.result.grades import all_sound, grades_of, leaves_more_than_noise
 from springmass.result.law_rows import laws_across, laws_of
+from springmass.result.summary import symbol
 from springmass.result.table1 import rows_and_needs, table_rows
 from springmass.runs.run import Run
 from springmass.typeset import MANY_FREEDOM, cells, count, page_unit, prefixed, pretty, pretty_number, typeset
@@ -158,6 +159,7 @@ def template(name: str) -> Template:
         "unit": page_unit,
         "typeset": typeset,
         "indexed": _indexed,
+        "symbol": symbol,
         "word": SEVERITY_WORDS.__getitem__,
     }
     return environment.get_template(name)

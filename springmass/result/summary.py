@@ -42,7 +42,7 @@ def text_summary(analysis: Analysis, name: str) -> str:
 def html_summary(analysis: Analysis, name: str) -> str:
     """Return a run as an HTML fragment without scripts: estimates, laws and findings."""
     rows = [
-        f"<tr><td>{escape(row.quantity)}</td><td><i>{_subscript(row.page_symbol)}</i></td>"
+        f"<tr><td>{escape(row.quantity)}</td><td>{symbol(row.page_symbol)}</td>"
         f"<td>{escape(pretty(row.estimates[0]))}</td></tr>"
         for row in table_rows([analysis])
     ]
@@ -101,6 +101,7 @@ def _cut(line: str) -> str:
     return textwrap.shorten(line, SUMMARY_WIDTH, placeholder=" ...")
 
 
-def _subscript(symbol: str) -> str:
-    letter, _, index = symbol.partition(" ")
-    return escape(letter) + (f"<sub>{escape(index)}</sub>" if index else "")
+def symbol(page_symbol: str) -> str:
+    """Return a symbol as HTML, with its index lowered."""
+    letter, _, index = page_symbol.partition(" ")
+    return f"<i>{escape(letter)}</i>" + (f"<sub>{escape(index)}</sub>" if index else "")

@@ -27,6 +27,7 @@ from springmass.errors import LOG, ProgramError
 from springmass.result.run_json import picked, plain
 from springmass.simulations.against import Against, compare_with_run, duration_s
 from springmass.simulations.from_run import SCENE_KEYS, scene_from_run
+from springmass.typeset import prefixed
 
 if TYPE_CHECKING:
     from springmass.runs.run import Run
@@ -422,7 +423,7 @@ def beside_measured(solved: Simulation) -> list[Predicted]:
         if measured is not None and measured.u > 0.0 and math.isfinite(value):
             label = QUANTITIES[name].label if name in QUANTITIES else f"amplitude after {over.trajectory.t[-1]:.4g} s"
             apart = None if same else (measured.value - value) / math.hypot(measured.u, own)
-            rows.append(Predicted(label, Estimate(value, own, measured.unit), measured, apart))
+            rows.append(Predicted(label, prefixed(Estimate(value, own, measured.unit)), prefixed(measured), apart))
     return rows
 
 

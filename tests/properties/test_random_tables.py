@@ -252,6 +252,13 @@ def test_none_of_three_thousand_tables_is_wrong(tmp_path: Path) -> None:
     assert Counter(outcomes.values())["read"] >= 0.7 * count
 
 
+def test_the_clock_of_a_monitor_before_two_long_lines_is_no_sample(tmp_path: Path) -> None:
+    """Its first sample was taken for a name, because a monitor's clock was looked for before three lines or more."""
+    table = write(523)
+    assert table.drawn.endswith("long lines")
+    assert judge(tmp_path / "run.csv", table) in ("read", "asked")
+
+
 @pytest.mark.parametrize("cell", ["1,234", "01/02/03"])
 def test_what_is_ambiguous_is_asked(tmp_path: Path, cell: str) -> None:
     """A separator of thousands or a decimal comma; a date of three orders."""

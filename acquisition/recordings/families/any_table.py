@@ -162,7 +162,7 @@ def without_monitor(text: Text) -> Text:
         return text
     lines = decode(text.data)
     stamped = len(_MONITOR.findall(lines))
-    if stamped < max(_FEWEST, _SHARE * len(re.findall(r"^.*\S", lines, re.MULTILINE))):
+    if stamped < max(2, _SHARE * len(re.findall(r"^.*\S", lines, re.MULTILINE))):
         return text
     messages = [line for line in _MONITOR.sub("", lines[: 1 << 16]).split("\n") if line.strip()]
     marks = Counter(next((mark for mark in "\t;," if mark in line), " ") for line in messages)

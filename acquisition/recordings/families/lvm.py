@@ -160,15 +160,15 @@ def _joined(passes: list[list[Table]]) -> list[Table]:
         tables.append(
             replace(
                 parts[0],
-                columns=(_one([each.columns[0] for each in parts]),),
-                times=_one([_times(each) for each in parts]),
+                columns=(_end_to_end([each.columns[0] for each in parts]),),
+                times=_end_to_end([_times(each) for each in parts]),
                 formula=None,
                 run=f"Segments 1 to {len(parts)}",
                 lines=lines[-1]._replace(
                     numbers=np.concatenate([each.numbers for each in lines]),
                     words=np.concatenate([each.words for each in lines]),
                 ),
-                beside=tuple(_one(list(each)) for each in zip(*(part.beside for part in parts), strict=True)),
+                beside=tuple(_end_to_end(list(each)) for each in zip(*(part.beside for part in parts), strict=True)),
             )
         )
     return tables
@@ -191,7 +191,7 @@ def _runs_on(before: Table, after: Table) -> bool:
     return bool(0.0 < begin[0] - t[-1] < max(0.5, 2.5 / (t.size - 1)) * (t[-1] - t[0]))  # false for a NaN
 
 
-def _one(parts: list[Column]) -> Column:
+def _end_to_end(parts: list[Column]) -> Column:
     return replace(
         parts[0],
         values=np.concatenate([part.values for part in parts]),

@@ -130,8 +130,7 @@ class MotionSensor(ColumnFormat):
             problem = f"expected a position and a velocity file, got {p.column.name} in both ({p.name} too)"
             raise FormatError(v.path, problem, "name the other file of the pair")
         joined = _joined(p, v).recording(self.name, position_data)
-        unread = joined.malformed_rows + int(np.count_nonzero(~v.sound))
-        return replace(joined, malformed_rows=unread, originals=(*joined.originals, Original(v.name, velocity_data)))
+        return replace(joined, originals=(*joined.originals, Original(v.name, velocity_data)))
 
     def _samples(self, path: str, data: bytes, answers: ReadOptions) -> Samples:
         """Read the samples of a file, m or m/s, with the error that it states."""
@@ -193,8 +192,9 @@ def _joined(p: Samples, v: Samples) -> Samples:
     flags = time_flags(t, 1.0 / rate_hz)
     flags |= np.where(in_p, p.block.flags[from_p], v.block.flags[from_v]) & UNREAD_FLAGS
     flags[~in_p] |= Flag.MISSING.value
-    block, traps = Block(0, t, distance, flags, None, speed), _join_traps(p, v, from_p, from_v)
-    return replace(p, block=block, traps=(*p.traps, *traps))
+    traps, malformed_rows = _join_traps(p, v, from_p, from_v), p.malformed_rows + v.malformed_rows
+    block = Block(0, t, distance, flags, None, speed)
+    return replace(p, block=block, traps=(*p.traps, *traps), malformed_rows=malformed_rows)
 
 
 def _join_traps(p: Samples, v: Samples, from_p: I8, from_v: I8) -> Iterator[FormatIssue]:

@@ -9,7 +9,7 @@ from pathlib import PurePath
 
 import numpy as np
 
-from acquisition.block import B1, F8, I8, Block, ClockKind, Flag, SourceInfo, SourceKind
+from acquisition.block import F8, I8, Block, ClockKind, Flag, SourceInfo, SourceKind
 from acquisition.errors import FormatError
 from acquisition.recordings.reading import ReadOptions
 from acquisition.recordings.recording import FormatIssue, Original, Recording
@@ -41,7 +41,7 @@ class Samples:
     """The samples of a chosen channel in SI units, a block, and the remarks on them and on the file.
 
     ``resolution`` is the size of the last printed digit of a value. ``lines`` are the line numbers of the samples, None
-    for a binary file. ``sound`` marks the rows of the table that could be read. ``quantum`` is the step of which all
+    for a binary file. ``malformed_rows`` counts rows that could not be read. ``quantum`` is the step of which all
     values are multiples, and ``error_m`` the usual error that the file states.
     """
 
@@ -54,7 +54,7 @@ class Samples:
     resolution: float
     traps: tuple[FormatIssue, ...]
     lines: I8 | None
-    sound: B1
+    malformed_rows: int
     quantum: float | None = None
     error_m: float | None = None
 
@@ -79,7 +79,7 @@ class Samples:
             channel=column.name,
             samples=self.block,
             traps=self.traps,
-            malformed_rows=int(np.count_nonzero(~self.sound)),
+            malformed_rows=self.malformed_rows,
             originals=(Original(name, data),),
             title=table.title,
             run=table.run,
@@ -150,7 +150,8 @@ def read_samples(
     zeros = table.lines.zeros if table.lines else 0
     issues += [*row_traps(rows, timed, zeros), *sample_traps(flags, t, timing.rate_hz, lines)]
     block = Block(0, t, value, flags, quantity=measured.quantity, unit=measured.si)
-    return Samples(path, table, column, measured, block, timing, rows.resolution, tuple(issues), lines, ~unread)
+    malformed = int(np.count_nonzero(unread))
+    return Samples(path, table, column, measured, block, timing, rows.resolution, tuple(issues), lines, malformed)
 
 
 def _jumps(t: F8, rate_hz: float, lines: I8 | None) -> list[FormatIssue]:

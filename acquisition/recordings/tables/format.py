@@ -14,7 +14,7 @@ from acquisition.recordings.tables.blocks import by_label, runs_of, with_units_o
 from acquisition.recordings.tables.channel import check_lengths, read_channel, read_samples, rows_of
 from acquisition.recordings.tables.rows import read_rows
 from acquisition.recordings.tables.table import Column, Header, Table, TableFacts, names_apart, side_by_side
-from acquisition.recordings.tables.text import Text, head_lines, text_of
+from acquisition.recordings.tables.text import Text, is_text, text_of
 from acquisition.units import NUMBER
 
 _HEAD_LINES = 300
@@ -113,19 +113,17 @@ def text_format(
     ColumnFormat
     """
 
+    def read(text: Text) -> tuple[Text, Header | None]:
+        text = prepare(text) if prepare else text
+        return text, header(text.head(_HEAD_LINES) or [""])
+
     def evidence(head: bytes) -> str:
-        lines = head_lines(head)
-        if prepare is not None and lines != [""]:
-            lines = prepare(Text.of(head)).head(_HEAD_LINES)
-        above = header(lines[:_HEAD_LINES])
+        _, above = read(Text.of(head if is_text(head) else b""))
         return above.why if above else ""
 
     def tables(path: str, data: bytes) -> list[Table]:
-        text = text_of(path, data)
-        text = prepare(text) if prepare else text
-        head = text.head(_HEAD_LINES)
-        above = header(head or [""])
-        if above is None or not head:
+        text, above = read(text_of(path, data))
+        if above is None or not len(text):
             raise FormatError(path, f"expected {expected}", "export the run again", line=1)
         if above.refused is not None:
             raise FormatError(path, *above.refused, line=above.lines + 1)

@@ -1,4 +1,4 @@
-"""Find the table in the first lines of any text, and the roles of its columns."""
+"""Find the table in the first lines of any text, and the columns that may be its times or row numbers."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ def read_rows(
     pieces: list[list[tuple[int, F8, I1, B1]]] = []  # for each column, each from a row on
     cells_of: dict[int, list[bytes]] = {at: [] for at in (*clocks, *words)}
     numbers = [np.empty(0, np.int64)]
-    most, count, number, last = int(text.starts[stop] - text.starts[first]) + _MOST_EMPTY, 0, first + 1, []
+    allowed_cells, count, number, last = int(text.starts[stop] - text.starts[first]) + _MOST_EMPTY, 0, first + 1, []
     for page in text.pages(first, stop):
         lines = split_page(page, mark)
         numbers.append(np.flatnonzero(list(map(bool, lines))) + number)
@@ -48,8 +48,8 @@ def read_rows(
         rows = list(filter(None, lines))
         if not rows:
             continue
-        most -= len(rows) * max(map(len, rows))
-        if most < 0:
+        allowed_cells -= len(rows) * max(map(len, rows))
+        if allowed_cells < 0:
             raise FormatError(path, "expected rows of like length, got a few much longer rows", "split the file")
         for at, cells in enumerate(zip_longest(*rows, fillvalue=b"")):
             if at == len(pieces):

@@ -147,9 +147,7 @@ def duration_s(cell: str) -> tuple[float, int] | None:
     pair = quantity(cell)
     if pair is not None and (unit := time_unit(pair[1])) is not None:
         number, decimals = number_of(pair[0])
-        places = max(
-            0, decimals % EXPONENT - unit.power - (0 if unit.factor == 1.0 else round(math.log10(unit.factor)))
-        )
+        places = max(0, decimals % EXPONENT - unit.power - round(math.log10(unit.factor)))
         return round(number * 10.0**unit.power * unit.factor, places + 6 * (decimals >= EXPONENT)), places
     match = _DURATION.fullmatch(cell.lower())
     parts = [match[name] for name in ("d", "h", "h2", "m2", "s2") if match[name]] if match else []

@@ -121,7 +121,9 @@ class RecordingCard {
   show_opened(opened) {
     this.at(".facts").replaceChildren(...(opened.simulated ? [element("span", "simulated, not measured", { className: "kind" }), " "] : []), [opened.format, ...opened.facts].join(" · "), opened.recorded ? ` · ${opened.recorded}` : "");
     const fold = this.at(".assumed");
-    fold.querySelector("summary").textContent = `How it was read${opened.assumed.length ? `: ${opened.assumed.length} remarks` : ""}`;
+    const remarks = opened.assumed.length;
+    const count = remarks ? `: ${remarks} remark${remarks > 1 ? "s" : ""}` : "";
+    fold.querySelector("summary").textContent = `How it was read${count}`;
     fold.querySelector("ul").replaceChildren(...opened.assumed.map((text) => element("li", text)));
     this.draw(this.at(".outline"), { ...opened.outline, caption: "" });
   }
