@@ -308,7 +308,7 @@ def find_apart(samples: Samples) -> Apart | None:
         return None
     omega, power = record.spectrum(record.values, 2)
     first = float(omega[np.argmax(power)])
-    for second in _others(record, first, omega, power):
+    for second in _others(record, first, omega):
         # Most records have no such line, which a part of the samples shows in a tenth of the time.
         if _kept_up(record.thinned(max(first, second)), samples, first, second) is None:
             continue
@@ -336,7 +336,7 @@ def _kept_up(record: Scaled, samples: Samples, first: float, second: float) -> t
     return None
 
 
-def _others(record: Scaled, first: float, omega: F8, power: F8) -> Iterator[float]:
+def _others(record: Scaled, first: float, omega: F8) -> Iterator[float]:
     """Yield the highest line beside a steady first one, and that far above it and beside its multiples.
 
     Neither may be one of the noise, nor a sideband of the first one's decay, which a few samples in each period give.
@@ -355,11 +355,11 @@ def _others(record: Scaled, first: float, omega: F8, power: F8) -> Iterator[floa
     room = math.tau / record.seconds
     beside = np.abs(omega - first * np.round(omega / first))
     far = (omega > HIGHEST_MODE * first) & (beside > room + NOTICEABLE * omega)
-    for powers, among in ((left, left > 0.0), (power, far)):
+    for among in (left > 0.0, far):
         if np.count_nonzero(among) <= FEWEST_FOR_CURVE:
             continue
-        peak, line = float(np.max(powers[among])), float(omega[among][np.argmax(powers[among])])
-        floor = median(powers[among]) / math.log(2.0)
+        peak, line = float(np.max(left[among])), float(omega[among][np.argmax(left[among])])
+        floor = median(left[among]) / math.log(2.0)
         if abs(line - first) > room and peak > math.log(record.tau.size / IMPROBABLE) * floor:
             yield line
 
