@@ -61,7 +61,7 @@ else:
         return sorted(__all__)
 
 
-__version__ = "0.3.0"
+__version__ = "0.4.0"
 
 # fmt: off
 __all__ = [
