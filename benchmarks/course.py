@@ -53,7 +53,7 @@ import json, sys
 from springmass.course.plan import plan
 from springmass.commands.questions import for_course
 from springmass.course.worker import analyse_one
-jobs = plan([sys.argv[1]]).jobs
+jobs = plan([sys.argv[1]]).tasks
 peaks = []
 for part in (jobs[: len(jobs) // 2], jobs[len(jobs) // 2 :]):
     for job in part:

@@ -69,6 +69,7 @@ class SimulatedPort:
 
     name = "simulated day"
     is_network = False
+    shared = False
 
     def __init__(self, clock: LockstepClock) -> None:
         self._clock = clock
