@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import sys
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -80,6 +82,12 @@ def test_every_truth_is_within_three_uncertainties(run: Sample) -> None:
     assert max(abs(z) for z in pulls.values()) <= 3.0, pulls
 
 
+def test_true_law_is_admissible(run: Sample) -> None:
+    """The law that made the recording is not rejected."""
+    assert run.truth["law"] in run.result.damping.admissible
+    assert "none" not in run.result.damping.admissible
+
+
 def test_false_echoes_are_flagged(run: Sample) -> None:
     """At least 99 % of the listed false echoes end flagged, and little else but heavy tails."""
     echoes = run.truth["false_echo_rows"]
@@ -97,3 +105,17 @@ def test_clipped_run() -> None:
     assert run.result.samples.plateaus == (pytest.approx(run.truth["clip_limit_m"], abs=2e-4),)
     assert run.share_flagged("clipped_rows", Quality.CLIPPED) >= 0.98
     assert run.result.quality["clipped"] <= 1.02 * len(run.truth["clipped_rows"])
+
+
+def test_no_error_and_no_false_alarm(run: Sample) -> None:
+    """What the simulation does not hold is not found: no drift, no bend, no misfit."""
+    codes = {finding.code for finding in run.result.findings}
+    assert not codes & {"rest_drift", "amplitude_dependent_frequency", "model_misfit", "no_oscillation", "quantised"}
+    assert "error" not in {finding.severity for finding in run.result.findings}
+
+
+def test_generator_shares_no_code_with_the_project() -> None:
+    """The generator imports the standard library and numpy only."""
+    source = (FOLDER / "generate.py").read_text("utf-8")
+    imported = set(re.findall(r"^(?:from|import) (\w+)", source, re.MULTILINE))
+    assert imported <= {*sys.stdlib_module_names, "numpy"}
