@@ -60,7 +60,10 @@ class Evidence(NamedTuple):
 def fit_motion(part: Part, options: Options) -> Motion:
     """Return the motion of a part: an oscillation, a relaxation, two modes of similar strength, or none."""
     cycles = _cycles(part, options)
-    known = Evidence(part, options, *((None, None, (cycles,)) if isinstance(cycles, Refusal) else (cycles, None, ())))
+    if isinstance(cycles, Refusal):
+        known = Evidence(part, options, cycles=None, motion=None, refused=(cycles,))
+    else:
+        known = Evidence(part, options, cycles=cycles, motion=None, refused=())
     for candidate in CANDIDATES:
         outcome = candidate(known)
         if isinstance(outcome, Refusal):

@@ -308,7 +308,7 @@ def find_apart(samples: Samples) -> Apart | None:
         return None
     omega, power = record.spectrum(record.values, 2)
     first = float(omega[np.argmax(power)])
-    for second in _others(record, first, omega):
+    for second in _others(record, first):
         # Most records have no such line, which a part of the samples shows in a tenth of the time.
         if _kept_up(record.thinned(max(first, second)), samples, first, second) is None:
             continue
@@ -336,7 +336,7 @@ def _kept_up(record: Scaled, samples: Samples, first: float, second: float) -> t
     return None
 
 
-def _others(record: Scaled, first: float, omega: F8) -> Iterator[float]:
+def _others(record: Scaled, first: float) -> Iterator[float]:
     """Yield the highest line beside a steady first one, and that far above it and beside its multiples.
 
     Neither may be one of the noise, nor a sideband of the first one's decay, which a few samples in each period give.
@@ -351,7 +351,7 @@ def _others(record: Scaled, first: float, omega: F8) -> Iterator[float]:
     rows = np.stack([np.ones(wave.size), *(x for each in (wave, share * wave) for x in (each.real, each.imag))])
     # Normal equations of five rows take a tenth of the time of a decomposition.
     size = np.linalg.lstsq(rows @ rows.T, rows @ record.values, rcond=None)[0]
-    left = record.spectrum(record.values - size @ rows, 2)[1]
+    omega, left = record.spectrum(record.values - size @ rows, 2)
     room = math.tau / record.seconds
     beside = np.abs(omega - first * np.round(omega / first))
     far = (omega > HIGHEST_MODE * first) & (beside > room + NOTICEABLE * omega)
