@@ -95,7 +95,8 @@ def damping_sentence(analysis: Analysis) -> str:
         rate = grades_of(analysis).get("damping_rate")
         if rate is None or rate.grade == "do not quote":
             return f"{text}; {ruled_out}."
-        return f"{text}; {ruled_out}. The damping rate may be quoted: it allows for all of them."
+        rate_words = "The damping rate may be quoted: it" if rate.grade == "sound" else "The damping rate"
+        return f"{text}; {ruled_out}. {rate_words} allows for all of them."
     others, rejected = len(damping.fits) - 1, sum(fit.rejected for fit in damping.fits.values())
     if not others:
         return f"{text}; no other law was tried."
