@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import shlex
-from collections.abc import Sequence
-from typing import Annotated, Any
-
-from cyclopts import Parameter, Token
+from typing import Annotated
 
 from acquisition.clock import SystemClock
 from acquisition.decoders.decoder import Identity
@@ -15,6 +12,7 @@ from acquisition.decoders.line_protocol import FAMILY, LineProtocolDecoder
 from acquisition.errors import visible
 from acquisition.live.firmware import BOOTLOADER_BAUDS, FIRMWARE_VERSION, HEX, WIRING, avrdude_arguments
 from acquisition.live.serial_port import SerialPort
+from springmass.commands.options import converted
 from springmass.commands.parameters import Whole, option
 from springmass.errors import HINT, LOG, OK, SENSOR, ProgramError
 from springmass.session.sensors import outdated, settings_of
@@ -24,29 +22,21 @@ ANSWER_S = 5.0
 ASK_EVERY_S = 0.5
 
 
-def _gate(_: Any, tokens: Sequence[Token]) -> tuple[int, int]:
-    near, comma, far = tokens[0].value.partition(",")
+def _gate(text: str) -> tuple[int, int]:
+    near, comma, far = text.partition(",")
     if not (comma and near.isdecimal() and far.isdecimal()):
         raise ValueError("must be NEAR,FAR in whole us")
     return int(near), int(far)
-
-
-Gate = Annotated[
-    tuple[int, int] | None,
-    Parameter(
-        metavar="NEAR,FAR",
-        help="range of accepted times of flight, us; NEAR is at least 116",
-        converter=_gate,
-        n_tokens=1,
-    ),
-]
 
 
 def firmware(
     *,
     port: Annotated[str | None, option("P", "port of the board")] = None,
     rate: Annotated[Whole | None, option("R", "pings per second, 10 to 125; the board stores the setting")] = None,
-    gate: Gate = None,
+    gate: Annotated[
+        tuple[int, int] | None,
+        converted("NEAR,FAR", "range of accepted times of flight, us; NEAR is at least 116", _gate, repeated=False),
+    ] = None,
     spread: Annotated[Whole | None, option("US", "largest random delay of a ping, 0 to 2000 us")] = None,
     name: Annotated[str | None, option("NAME", "name of the board: at most 12 letters, digits, . _ or -")] = None,
 ) -> int:
