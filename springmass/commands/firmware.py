@@ -76,16 +76,13 @@ def _converse(address: str, commands: list[str]) -> Identity:
             refused = decoder.faults["refused_command"]
             decoder.status.identity = None
             port.write(f"{command}\n".encode("ascii", "replace"))
-            while decoder.status.identity is None and decoder.faults["refused_command"] == refused:
+            while decoder.status.identity is None:
                 if clock.now_ns() > end_ns:
                     raise ProgramError(f"{address}: no answer to {command!r}", "try again", SENSOR)
                 decoder.feed(0, _heard(port, clock))
-            if decoder.faults["refused_command"] > refused:
-                raise ProgramError(
-                    f"{address}: the device does not take {command!r}",
-                    "docs/reference/line-protocol.md has the ranges",
-                    SENSOR,
-                )
+                if decoder.faults["refused_command"] > refused:
+                    wrong = f"{address}: the device does not take {command!r}"
+                    raise ProgramError(wrong, "docs/reference/line-protocol.md has the ranges", SENSOR)
         assert decoder.status.identity is not None
         return decoder.status.identity
 
@@ -97,7 +94,7 @@ def _ask(port: SerialPort, decoder: LineProtocolDecoder, clock: SystemClock, end
         if clock.now_ns() > end_ns:
             what = "readings, but not what it is" if heard else "nothing"
             wrong = f"{port.name}: the device was asked what it is and said {what}"
-            raise ProgramError(f"{wrong}", "is it the right port? `springmass firmware` shows how to flash it", SENSOR)
+            raise ProgramError(wrong, "is it the right port? `springmass firmware` shows how to flash it", SENSOR)
         port.write(FAMILY.identify)
         until_ns = clock.now_ns() + int(ASK_EVERY_S * 1e9)
         while decoder.status.identity is None and clock.now_ns() < until_ns:

@@ -85,8 +85,8 @@ def plan(
     """Find the runs of a course and the known values of each.
 
     Inputs are files, folders with all their contents, and patterns; without inputs, the files that the table of runs
-    names. Scene and options are for all runs, and the table takes precedence. ``known`` are paths that an earlier pass
-    identified as recordings, ``output`` is left out.
+    names. Scene and options are for all runs, and the table takes precedence. ``known_paths`` were
+    identified as recordings by an earlier pass, ``output`` is left out.
     """
     table = None if runs_csv is None else read_table(runs_csv)
     out = {os.path.abspath(path) for path in (output, runs_csv) if path is not None}
