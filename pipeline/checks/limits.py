@@ -30,11 +30,11 @@ class Limit(NamedTuple):
 
 
 def _too_fast(numbers: Mapping[str, float]) -> Misfit:
-    return Misfit(name="implausible_motion", amplitude=numbers["amplitude_m"] * (1.0 - 1.0 / numbers["gravities"]))
+    return Misfit("implausible_motion", {"amplitude": numbers["amplitude_m"] * (1.0 - 1.0 / numbers["gravities"])})
 
 
 def _no_distance(numbers: Mapping[str, float]) -> Misfit:
-    return Misfit(name="implausible_distance", offset=max(numbers["amplitude_m"], numbers["rest_m"]))
+    return Misfit("implausible_distance", {"offset": max(numbers["amplitude_m"], numbers["rest_m"])})
 
 
 # Below two samples per period the frequency is aliased by the sampling theorem, and below four, which is chosen, noise

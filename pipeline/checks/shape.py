@@ -63,14 +63,9 @@ def folded_shape(residual: Residual) -> Outcome | None:
         fall = max(1.0, -math.log(max(float(relative[-1]), 1e-3)))
     power, order = np.abs(mean[stands]) ** 2, orders[stands]
     moved = peak + 2.0 * float(np.sum(np.sqrt(power[order == 3])))
-    misfit = Misfit(
-        name="model_misfit",
-        amplitude=moved,
-        offset=peak,
-        phase_rad=peak / amplitude,
-        damping_rate=2.0 * moved / amplitude * fall / residual.seconds,
-    )
     share, way = peak / amplitude, _way(power, order, wave)
+    sizes = {"damping_rate": 2.0 * moved / amplitude * fall / residual.seconds}
+    misfit = Misfit("model_misfit", {"amplitude": moved, "offset": peak, "phase": share, **sizes})
     numbers = None if share < REPORTED else {"peak_m": peak, "share": share, **way}
     explained = np.zeros(bins.size)
     for one, k in zip(each, order.tolist(), strict=True):
