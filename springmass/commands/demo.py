@@ -1,7 +1,5 @@
 """``springmass demo``: the main job on the bundled recordings, from their files to Table 1."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Annotated

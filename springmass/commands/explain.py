@@ -1,7 +1,5 @@
 """``springmass explain``: what a finding means, what causes it, what to do, and an example."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from difflib import get_close_matches

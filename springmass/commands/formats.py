@@ -1,7 +1,5 @@
 """``springmass formats``: the families of recordings, or what one file is."""
 
-from __future__ import annotations
-
 import json
 import shlex
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """``springmass page``: the window, to which recordings are dropped; or one recording, as it happens or as it was."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import logging

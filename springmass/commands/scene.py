@@ -1,7 +1,5 @@
 """``springmass scene``: a scene to fill in, a scene checked, and what is noted beside a recording afterwards."""
 
-from __future__ import annotations
-
 import shlex
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """``springmass simulate``: the motion that a scene predicts, its uncertainty, and the cost of computing it."""
 
-from __future__ import annotations
-
 import json
 import math
 import shlex

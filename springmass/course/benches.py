@@ -1,7 +1,5 @@
 """Compare the runs of a course: springs, discs, scatter within and between benches, and wrongly labelled runs."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections import Counter

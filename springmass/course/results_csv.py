@@ -1,7 +1,5 @@
 """The columns of a course's table, and ``results.csv``, the file that everything else reads."""
 
-from __future__ import annotations
-
 import csv
 import os
 import re

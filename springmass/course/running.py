@@ -1,7 +1,5 @@
 """Make one pass over a course: analyse new and changed runs, then write table, page and reports of all rows."""
 
-from __future__ import annotations
-
 import hashlib
 import heapq
 from collections.abc import Collection, Iterator, Sequence

@@ -1,7 +1,5 @@
 """Recordings from arrays in memory: their units are read or refused, never ignored."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Collection, Mapping
 from dataclasses import asdict, fields, replace

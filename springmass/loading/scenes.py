@@ -1,7 +1,5 @@
 """Scenes from files or given in Python: masses, disc, air and sensor of the bench; and values that replace some."""
 
-from __future__ import annotations
-
 import codecs
 import os
 import re

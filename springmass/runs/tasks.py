@@ -1,7 +1,5 @@
 """Recordings to analyse one after the other: a task for each, and its analysed run or the reason why there is none."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace

@@ -4,8 +4,6 @@ The operator works on the session's thread and checks for requests between its w
 sensors, which has a separate thread. The page is informed of each action after it is done.
 """
 
-from __future__ import annotations
-
 import contextlib
 import shutil
 import tempfile

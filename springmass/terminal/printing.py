@@ -1,7 +1,5 @@
 """Format Table 1, findings, comparisons and the classic method's numbers as text for a terminal or a pipe."""
 
-from __future__ import annotations
-
 import shutil
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
