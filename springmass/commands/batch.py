@@ -54,25 +54,24 @@ def batch(
     """Analyse new and changed runs, and write the table and the page of all runs."""
     reading.refuse("on a course, whose pairs are found by their names", "velocity")
     how = analysis.of(reading.options)
-    inputs = [str(each) for each in recordings]
-    if not inputs and options.runs is None:
+    if not recordings and options.runs is None:
         raise ProgramError("batch needs recordings, folders or --runs FILE, got none of them")
     if options.template:
         given.only("with --template", "--template")
-        table = template([task.name for task in plan(inputs).tasks])
+        table = template([task.name for task in plan(recordings).tasks])
         # A file gets the paths unchanged, because they are read back from it.
         print(visible_lines(table) if sys.stdout.isatty() else table.removesuffix("\n"))
         return OK
     if options.output is None:
         raise ProgramError("batch needs a folder for the results", "name it with -o DIR")
-    if options.dask is not None and options.jobs:
-        raise ProgramError("--dask brings its workers, got --jobs too", "leave out --jobs")
+    if options.dask is not None:
+        given.refuse("with --dask, which brings its own workers", "--jobs")
     folder = make_folder(options.output)
     with opened(folder) as store:
         course = plan(
-            inputs,
-            runs_csv=None if options.runs is None else str(options.runs),
-            scene=None if options.scene is None else str(options.scene),
+            recordings,
+            runs_csv=options.runs,
+            scene=options.scene,
             how=how,
             known_paths=[json.loads(key)[0] for key in store.made_of()],
             output=str(folder),

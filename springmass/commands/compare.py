@@ -75,20 +75,19 @@ def compare(
     """Analyse every run, compare them, and print or write the result; for courses use the existing results."""
     reading.refuse("on several runs", "velocity")
     how = analysis.of(reading.options)
-    inputs = [str(each) for each in recordings]
-    if all(is_course(path) for path in inputs):
+    if all(is_course(path) for path in recordings):
         given.only("on courses, which are analysed already", "--json", "--strict")
-        return _run_courses(inputs, options)
-    if len(inputs) < 2:
+        return _run_courses(recordings, options)
+    if len(recordings) < 2:
         raise ProgramError(
-            f"compare needs two runs at least, got {len(inputs)}", "springmass analyse takes a single one"
+            f"compare needs two runs at least, got {len(recordings)}", "springmass analyse takes a single one"
         )
     if options.output is None:
         given.refuse("without -o", "--figures", "--template")
     # Scenes are read first, so that their errors are found before an hour of recordings is read.
-    scenes = read_scenes(options.scene, len(inputs))
+    scenes = read_scenes(options.scene, len(recordings))
     out = None if options.output is None else make_folder(options.output)
-    each = zip(inputs, distinct_names(inputs), scenes, strict=True)
+    each = zip(recordings, distinct_names(recordings), scenes, strict=True)
     runs = analysed(Task(path, name, scene, how) for path, name, scene in each)
     compared = compare_runs(
         runs, mass_correlation=options.mass_correlation, reported=options.reported, static=options.hooke

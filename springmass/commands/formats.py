@@ -54,7 +54,7 @@ def formats(
     for line in _lines(facts):
         print(visible(line))
     if "needs" not in facts:
-        LOG.log(HINT, f"springmass analyse {shlex.quote(str(file))}")
+        LOG.log(HINT, f"springmass analyse {shlex.quote(file)}")
     return OK
 
 

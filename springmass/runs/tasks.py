@@ -44,7 +44,7 @@ def analyse_all(tasks: Iterable[Task]) -> Iterator[Run | Failed]:
         def analysed(task: Task = task) -> Run:
             run = Run.of(task.source, task.scene, task.how, task.name)
             if task.values:
-                run = replace(run, stated=amended(run.scene, task.values, where="the command line"))
+                run = replace(run, stated=amended(run.scene, task.values))
             _ = run.analysis
             return run
 
