@@ -23,14 +23,14 @@ from springmass.commands.options import (
 )
 from springmass.commands.parameters import Share, argument, option, output
 from springmass.comparing.comparison import SpringComparison, compare_runs, comparison_json, comparison_words
-from springmass.course.results_csv import COURSE, is_course, read_rows
+from springmass.course.results_csv import COURSE, is_course, read_results
 from springmass.errors import HINT, LOG, OK, REJECTED, ProgramError
 from springmass.loading.save import now_utc
 from springmass.loading.scenes import read_scenes
 from springmass.result.output_names import distinct_names, make_folder
 from springmass.result.run_json import RESULT_SCHEMA, plain, provenance_of, rejected
 from springmass.runs.run import Run
-from springmass.runs.tasks import Task, analysed, law_lines
+from springmass.runs.tasks import Task, analysed_runs, law_lines
 from springmass.typeset import count
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def compare(
     scenes = read_scenes(scene, len(recordings))
     out = None if output is None else make_folder(output)
     each = zip(recordings, distinct_names(recordings), scenes, strict=True)
-    runs = analysed(Task(path, name, of_run, how) for path, name, of_run in each)
+    runs = analysed_runs(Task(path, name, of_run, how) for path, name, of_run in each)
     compared = compare_runs(runs, mass_correlation=mass_correlation, reported=reported, static=hooke)
     parameters = {**how.parameters, "mass_correlation": mass_correlation}
     result = comparison_json(compared, provenance_of(how.accuracy, parameters, now_utc()))
@@ -113,7 +113,7 @@ def _run_courses(folders: Sequence[str], *, as_json: bool, strict: bool) -> int:
     from springmass.course.benches import compare_rows
     from springmass.terminal.printing import visible_lines
 
-    rows = [{**row, COURSE: visible(folder)} for folder in folders for row in read_rows(folder)[0]]
+    rows = [{**row, COURSE: visible(folder)} for folder in folders for row in read_results(folder)[0]]
     compared = compare_rows(rows)
     print(
         json.dumps({"schema": RESULT_SCHEMA, **plain(compared)}, allow_nan=False)

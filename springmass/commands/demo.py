@@ -15,7 +15,7 @@ from springmass.loading.scenes import read_scene
 from springmass.report.write import write_report
 from springmass.result.output_names import make_folder
 from springmass.runs.run import Run
-from springmass.runs.tasks import Task, analysed
+from springmass.runs.tasks import Task, analysed_runs
 from springmass.terminal.printing import findings_text, text_table
 from springmass.terminal.style import style_of
 
@@ -49,5 +49,5 @@ def _one(name: str, out: Path) -> Run:
     old = load(data / f"{name}_simulated_position.txt", LoadOptions(velocity=velocity))
     scene = read_scene(data / f"{name}.scene.toml").to_mapping()
     path = save_run(out / f"{name}.h5", old, scene=scene, overwrite=True)
-    (run,) = analysed([Task(str(path), name)])
+    (run,) = analysed_runs([Task(str(path), name)])
     return run
