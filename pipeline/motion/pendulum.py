@@ -14,17 +14,17 @@ from pipeline.numerics.regression import scatter, solve_weighted
 from pipeline.track import F8
 from pipeline.windows.demodulate import ROUNDING, Windows
 
-# Roots of q, as in :func:`swings`, up to swings of 167 degrees; frequencies between two of them err by at most 1e-8, as measured.
+# Roots of q, as in :func:`swings`, up to swings of 167 degrees; frequencies between them err by 1e-8, as measured.
 ROOTS_OF_Q = np.linspace(0.0, 0.5, 5001)
 
 
 def swings(power: int) -> tuple[F8, F8]:
     """Return amplitudes (k,) of what is recorded of swings, and their frequencies over that of very small ones.
 
-    With :math:`q = e^{-\\pi K'/K}` of its elliptic functions, a swing has the frequency :math:`p = \\vartheta_3(q)^{-2}`,
-    over that of very small ones, and its angle the fundamental :math:`a = 8\\sqrt q/(1 + q)`. The fundamental of an
+    With :math:`q = e^{-\\pi K'/K}` of its elliptic functions, a swing has the frequency
+    :math:`p = \\vartheta_3(q)^{-2}` and its angle the fundamental :math:`a = 8\\sqrt q/(1 + q)`. The fundamental of an
     angular velocity is :math:`p a` times the frequency of very small swings, and that of a position :math:`p^2 a` times
-    the length (NIST Digital Library of Mathematical Functions, 20.2.3 and 22.11): ``power`` is that of p.
+    the length: ``power`` is that of p (NIST Digital Library of Mathematical Functions, 20.2.3 and 22.11).
     """
     q = ROOTS_OF_Q**2
     frequency = (1.0 + 2.0 * (q + q**4 + q**9)) ** -2
