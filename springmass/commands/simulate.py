@@ -1,7 +1,5 @@
 """``springmass simulate``: the motion that a scene predicts, its uncertainty, and the cost of computing it."""
 
-from __future__ import annotations
-
 import json
 import math
 import shlex
@@ -80,8 +78,9 @@ def simulate(
     where, say = str(against if scene is None else scene), sys.stderr if as_json else sys.stdout
     if run_file is not None and run_file.exists() and not overwrite:
         raise ProgramError(f"{visible(str(run_file))}: exists", "take another name, or --overwrite")
-    stated, run = None if scene is None else read_scene(scene), None
-    if scene is not None and stated is not None:
+    stated = run = None
+    if scene is not None:
+        stated = read_scene(scene)
         ask_about(stated, scene)
     if against is not None:
         run = Run.of(against, stated, AnalysisOptions(**reading.options.given()))
