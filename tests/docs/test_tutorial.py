@@ -29,6 +29,7 @@ LONG = (
     "docs/how-to/record-at-the-bench.md",
     "docs/how-to/simulate-a-bench.md",
     "docs/reference/command-line.md",
+    "docs/decisions/0004-demodulation-first.md",
     "docs/explanation/euler.md",
     "docs/explanation/method.md",
 )
