@@ -4,7 +4,7 @@ The packages are listed in the order of the data flow; each imports only from th
 
     track, units, notice, errors   one run as arrays; nouns and units; what a stage reports; the errors it raises
     numerics/       least squares, regression, estimates; independent of springs
-    bench/          scene, air and instrument: what is known before the analysis
+    bench/          scene, air and clock: what is known before the analysis
     samples/        which samples a fit may use
     windows/        amplitude, phase and rest position once per period
     parts/          which part of the recording swings freely

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,6 +75,9 @@ class Track:
         if self.unit not in RECORDED_UNITS:
             known = ", ".join(f"{recorded.quantity} in {unit}" for unit, recorded in RECORDED_UNITS.items())
             raise TrackError(f"a track holds one of {known}, got the unit {self.unit}", "convert to SI first")
+        for name in ("u_scale", "u_offset_m", "u_rate", "clock_limit", "compared_s"):
+            if (value := getattr(self, name)) is not None and not (math.isfinite(value) and value >= 0.0):
+                raise TrackError(f"{name} must be finite and not negative, got {value:g}", "leave it out")
 
     def __len__(self) -> int:
         return int(self.t.size)

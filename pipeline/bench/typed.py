@@ -12,51 +12,24 @@ class Scale(NamedTuple):
     """What a unit is in SI: ``factor`` times the number, plus ``zero``."""
 
     factor: float
-    zero: float = 0.0
+    zero: float
 
 
 # Pound, inch and atmosphere are exact by definition; the pressure of mercury is that of NIST SP 811, appendix B.
-SCALES: dict[str, dict[str, Scale]] = {
-    "kg": {
-        "kg": Scale(1.0),
-        "g": Scale(1e-3),
-        "mg": Scale(1e-6),
-        "lb": Scale(0.45359237),
-        "oz": Scale(0.45359237 / 16),
-    },
-    "m": {
-        "m": Scale(1.0),
-        "cm": Scale(1e-2),
-        "mm": Scale(1e-3),
-        "um": Scale(1e-6),
-        "in": Scale(0.0254),
-        "ft": Scale(0.3048),
-    },
-    "N/m": {"N/m": Scale(1.0), "N/cm": Scale(1e2), "N/mm": Scale(1e3), "mN/mm": Scale(1.0), "mN/m": Scale(1e-3)},
-    "degC": {
-        "degC": Scale(1.0),
-        "C": Scale(1.0),
-        "K": Scale(1.0, -273.15),
-        "degF": Scale(5.0 / 9.0, -160.0 / 9.0),
-        "F": Scale(5.0 / 9.0, -160.0 / 9.0),
-    },
-    "Pa": {
-        "Pa": Scale(1.0),
-        "hPa": Scale(1e2),
-        "mbar": Scale(1e2),
-        "kPa": Scale(1e3),
-        "bar": Scale(1e5),
-        "mmHg": Scale(133.3224),
-        "Torr": Scale(101325.0 / 760.0),
-        "inHg": Scale(3386.389),
-        "atm": Scale(101325.0),
-    },
-    "": {"%": Scale(1e-2)},
-    "s": {"s": Scale(1.0), "ms": Scale(1e-3), "us": Scale(1e-6)},
-    "m/s": {"m/s": Scale(1.0), "cm/s": Scale(1e-2), "mm/s": Scale(1e-3)},
+_POUND_KG, _ATMOSPHERE_PA = 0.45359237, 101325.0
+_FACTORS = {
+    "kg": {"kg": 1.0, "g": 1e-3, "mg": 1e-6, "lb": _POUND_KG, "oz": _POUND_KG / 16},
+    "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048},
+    "N/m": {"N/m": 1.0, "N/cm": 1e2, "N/mm": 1e3, "mN/mm": 1.0, "mN/m": 1e-3},
+    "degC": {"degC": 1.0, "C": 1.0, "K": 1.0, "degF": 5.0 / 9.0, "F": 5.0 / 9.0},
+    "Pa": {"Pa": 1.0, "hPa": 1e2, "mbar": 1e2, "kPa": 1e3, "bar": 1e5}
+    | {"mmHg": 133.3224, "Torr": _ATMOSPHERE_PA / 760.0, "inHg": 3386.389, "atm": _ATMOSPHERE_PA},
+    "": {"%": 1e-2},
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
+    "m/s": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
 }
-"""The units in which a value may be typed, by the unit of its key; a key of any other unit takes that one alone."""
-
+_ZEROS = {"K": -273.15, "degF": -160.0 / 9.0, "F": -160.0 / 9.0}
+_NO_NUMBER = "must be a number, with its standard uncertainty as 0.2007+/-0.0001 or 0.2007(1)"
 _SIGNS = str.maketrans({"\u2212": "-", "\u2013": "-", "µ": "u", "μ": "u", "\u00a0": " ", "\u202f": " "})
 _FLOAT = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _UNIT_TWICE = re.compile(rf"({_FLOAT})\s*(?![eE][-+]?\d)([^\s\d.()+-]\S*?)\s*(?:\+/-|\+-|±)\s*({_FLOAT})\s*\2")
@@ -64,8 +37,8 @@ _TYPED = re.compile(rf"(\(?\s*{_FLOAT}(?:\(\d*\.?\d+\))?(?:\s*(?:\+/-|\+-|±)\s*
 
 
 def scales_of(unit: str) -> dict[str, Scale]:
-    """Return the units in which a value of this unit may be typed."""
-    return SCALES.get(unit) or {unit: Scale(1.0)}
+    """Return the units in which a value of this unit may be typed; without any of its own, it is the only one."""
+    return {name: Scale(factor, _ZEROS.get(name, 0.0)) for name, factor in _FACTORS.get(unit, {unit: 1.0}).items()}
 
 
 def typed(text: str, unit: str) -> Estimate:
@@ -87,11 +60,11 @@ def typed(text: str, unit: str) -> Estimate:
     text = _UNIT_TWICE.sub(r"\1+/-\3 \2", text.translate(_SIGNS).strip())
     match = _TYPED.fullmatch(text)
     if match is None:
-        raise ValueError("must be a number, with its standard uncertainty as 0.2007+/-0.0001 or 0.2007(1)")
+        raise ValueError(_NO_NUMBER)
     if (match[2] or "").startswith(","):
         raise ValueError("must be a number with a decimal point and not a comma")
     number, own = match[1], (match[2] or "").replace("°", "").replace(" ", "")
-    scales = {name.replace(" ", ""): scale for name, scale in scales_of(unit).items()} | {"": Scale(1.0)}
+    scales = {name.replace(" ", ""): scale for name, scale in scales_of(unit).items()} | {"": Scale(1.0, 0.0)}
     if own not in scales:
         raise ValueError(f"must have one of the units {', '.join(scales_of(unit))}")
     scale = scales[own]
@@ -101,9 +74,7 @@ def typed(text: str, unit: str) -> Estimate:
         try:
             measured = ufloat_fromstr(number)
         except (ValueError, NegativeStdDev):
-            raise ValueError(
-                "must be a number, with its standard uncertainty as 0.2007+/-0.0001 or 0.2007(1)"
-            ) from None
+            raise ValueError(_NO_NUMBER) from None
         value, u = measured.nominal_value, measured.std_dev
     # Rounded to the digits of a float, so that 217.6 g is the number 0.2176 and not 0.21760000000000002.
     return Estimate(float(f"{value * scale.factor + scale.zero:.15g}"), float(f"{u * scale.factor:.15g}"), unit)

@@ -49,12 +49,12 @@ def judge(
         return ((Notice("held_samples", numbers_of_held),) if repeats > 1 else ()), ()
     fitted = motion
     if (walk := motion.phase.walk) is not None:
-        spread = Misfit(name="random_excitation", amplitude=walk.spread)
+        spread = Misfit("random_excitation", {"amplitude": walk.spread})
         return (Notice("random_excitation", {"wander_rad": walk.wander, "amplitude_m": walk.amplitude}),), (spread,)
     outcomes = list(beyond_limits(samples, fitted, spring=scene.hangs_on_spring))
     if lost is not None:
         missing = {"places": lost.places, "share": lost.share}
-        outcomes.append(Outcome("lost_rows", missing, Misfit(name="lost_rows", clock=lost.share)))
+        outcomes.append(Outcome("lost_rows", missing, Misfit("lost_rows", {"clock": lost.share})))
     residual = residual_of(samples, fitted, SensorFilter.of(scene, samples.track.rate_hz))
     for test in (slow_change,) if fitted.method == "equation" else TESTS:
         if (outcome := test(residual)) is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,16 +22,13 @@ from pipeline.windows.demodulate import model_error
 PARTS = 16
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Misfit:
+class Misfit(NamedTuple):
     """Standard uncertainties of the estimates because the model of the fit does not describe the record."""
 
     name: str  # of the input in every budget
-    amplitude: float = 0.0
-    offset: float = 0.0
-    phase_rad: float = 0.0
-    damping_rate: float = 0.0
-    clock: float = 0.0  # relative, of all quantities measured by the times of the record
+    # By what they are added to: "amplitude", "offset", "phase", "damping_rate", or "clock", which is relative and of
+    # all quantities measured by the times of the record.
+    sizes: Mapping[str, float]
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,4 +37,4 @@ def rounding(samples: Samples, fitted: Oscillation) -> Misfit | None:
         return None
     # The windows' uncertainties include it too: only what exceeds that of their mean is added.
     u_rest = math.sqrt(max(0.25 * float(abs(errors.mean())) ** 2 - fitted.rest.mean.u**2, 0.0))
-    return Misfit(name="rounding", amplitude=u_amplitude, offset=u_rest, damping_rate=u_rate)
+    return Misfit("rounding", {"amplitude": u_amplitude, "offset": u_rest, "damping_rate": u_rate})

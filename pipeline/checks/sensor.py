@@ -72,8 +72,8 @@ def held(residual: Residual) -> Outcome | None:
         # A reading between two samples bends the line at both.
         count, late = 2.0 * white / share, 0.0
     loss = min((2.0 - late) * (count * turn) ** 2 / 24.0, 1.0)
-    amplitude, phase_rad = residual.amplitude * loss, late * 0.5 * (count - 1.0) * turn
-    misfit = Misfit(name="held_samples", amplitude=amplitude, phase_rad=phase_rad)
+    phase = late * 0.5 * (count - 1.0) * turn
+    misfit = Misfit("held_samples", {"amplitude": residual.amplitude * loss, "phase": phase})
     return Outcome("held_samples", held_numbers(repeats, residual.step_s), misfit, lags=math.inf)
 
 
@@ -110,7 +110,7 @@ def smoothed(residual: Residual) -> Outcome | None:
     if loss * residual.amplitude < 0.5 * u_amplitude or loss < 4.0 * expected:
         return None
     late = 0.5 * (count - 1.0)
-    misfit = Misfit(name="sensor_smoothing", amplitude=residual.amplitude * loss, phase_rad=late * turn)
+    misfit = Misfit("sensor_smoothing", {"amplitude": residual.amplitude * loss, "phase": late * turn})
     numbers = {
         "correlation": first / variance,
         "amplitude_loss": loss,

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from pipeline.notice import Notice, Severity
 from pipeline.units import amount, noun, number, plural
@@ -67,27 +67,10 @@ def kinds() -> Mapping[str, FindingKind]:
     import tomllib
 
     blocks = tomllib.loads(Path(__file__).with_name("findings.toml").read_text(encoding="utf-8"))
-    return {
-        code: FindingKind(**{name: _field(name, value) for name, value in block.items()})
-        for code, block in blocks.items()
-    }
-
-
-def _field(name: str, value: Any) -> Any:
-    if name in (
-        "severity",
-        "says",
-        "why",
-        "details",
-        "advice",
-        "states",
-        "doubts",
-        "doubts_anyway",
-        "about",
-        "explains",
-    ):
-        return (value,) if isinstance(value, str) else tuple(value)
-    return value
+    several = {name for name, kind in FindingKind.__annotations__.items() if kind.startswith("tuple")}
+    for block in blocks.values():
+        block |= {name: (x,) if isinstance(x := block[name], str) else tuple(x) for name in several & block.keys()}
+    return {code: FindingKind(**block) for code, block in blocks.items()}
 
 
 def word(found: Notice, unit: str = "m") -> Finding:

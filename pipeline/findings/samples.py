@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
-from pipeline.bench.instrument import Instrument
+from pipeline.bench.clock_rate import clock_rate
 from pipeline.checks.echoes import count_quality
 from pipeline.notice import Notice
 from pipeline.numerics.levels import NEGLIGIBLE, SIGNIFICANT
@@ -74,9 +74,8 @@ def clock_findings(track: Track) -> Iterator[Notice]:
     """Yield what is known of the clock of the sensor and of late readings."""
     if track.clock == "nominal":
         yield Notice("nominal_clock")
-    instrument = Instrument.of(track)
-    if instrument.clock_refused:
-        yield Notice("clock_refused", {"why": instrument.clock_words})
+    if (clock := clock_rate(track)).refused:
+        yield Notice("clock_refused", {"why": clock.words})
     if track.held_samples:
         yield Notice("late_readings", {"readings": track.held_samples, "longest_stall_s": track.longest_stall_s})
 

@@ -8,10 +8,10 @@ from typing import Any
 
 from pipeline.bench.air import U_DENSITY, U_SOUND, U_VISCOSITY, air_density, air_viscosity, speed_of_sound
 from pipeline.bench.disc import scene_air
-from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.budget import Inputs, function_of
+from pipeline.track import Track
 
 
 class Ambient:
@@ -21,11 +21,10 @@ class Ambient:
     temperature, so results include their correlation.
     """
 
-    def __init__(self, scene: Scene, inputs: Inputs, *, u_temperature_k: float) -> None:
+    def __init__(self, scene: Scene, inputs: Inputs) -> None:
         celsius, pressure, humidity = scene_air(scene)
         self._sensor = scene.tells_of_sensor
         self.known = scene.air_temperature_c is not None
-        celsius = Estimate(celsius.value, celsius.u or u_temperature_k, "degC")
         self._inputs = inputs
         self._temperature = inputs.add("air_temperature", celsius, "B")
         self._pressure = inputs.add("air_pressure", pressure, "B")
@@ -42,7 +41,7 @@ class Ambient:
         """Return the dynamic viscosity of the air, Pa s."""
         return function_of(air_viscosity, self._temperature, self._pressure) * self._viscosity_formula
 
-    def scale(self, instrument: Instrument) -> Any:
+    def scale(self, track: Track) -> Any:
         """Return the factor on all distances: 1, with the uncertainty of the speed of sound or of a calibration.
 
         If the record used another speed of sound than that of the scene's air, the difference is not corrected; it is
@@ -50,14 +49,14 @@ class Ambient:
         +- 3 degC. If neither record nor scene names a rangefinder, the distances need not come from echoes, and
         their scale is exact.
         """
-        if instrument.u_scale > 0:
-            return self._inputs.add("calibrated_scale", Estimate(1.0, instrument.u_scale), "B")
-        if not self._sensor and not instrument.sonic:
+        if track.u_scale > 0:
+            return self._inputs.add("calibrated_scale", Estimate(1.0, track.u_scale), "B")
+        if not self._sensor and not track.sonic:
             return 1.0
         sound = function_of(speed_of_sound, self._temperature, self._pressure, self._humidity)
         actual = Estimate.of_variable(sound, "m/s").value
         factor = sound / actual * self._inputs.add("speed_of_sound_formula", Estimate(1.0, U_SOUND), "B")
-        if instrument.speed_of_sound_m_per_s is not None:
-            half = abs(actual / instrument.speed_of_sound_m_per_s - 1.0)
+        if track.speed_of_sound_m_per_s is not None:
+            half = abs(actual / track.speed_of_sound_m_per_s - 1.0)
             factor *= self._inputs.add("recorded_speed_of_sound", Estimate(1.0, half / math.sqrt(3.0)), "B")
         return factor

@@ -79,20 +79,18 @@ class Inputs:
     """
 
     def __init__(self) -> None:
-        self._kinds: dict[str, Evaluation] = {}
-        self._dofs: dict[str, float] = {}
-        self._single: dict[str, Estimate] = {}
+        # The kind of every input, its degrees of freedom, and its estimate if it is a single one.
+        self._inputs: dict[str, tuple[Evaluation, float, Estimate | None]] = {}
 
     def add(self, name: str, estimate: Estimate, kind: Evaluation, dof: float = math.inf) -> Any:
         """Return an input as a variable, or as a plain number if it is exact."""
         from uncertainties import ufloat
 
-        self._register(name, kind, dof)
+        self._register(name, kind, dof, estimate)
         if not (math.isfinite(estimate.u) and estimate.u >= 0):
             raise AnalysisError(
                 f"{name}: a standard uncertainty must be finite and not negative, got {estimate.u:g}", "check the input"
             )
-        self._single[name] = estimate
         return ufloat(estimate.value, estimate.u, name) if estimate.u > 0 else estimate.value
 
     def add_joint(self, name: str, joint: Joint, dof: float = math.inf) -> list[Any]:
@@ -102,16 +100,12 @@ class Inputs:
         self._register(name, "A", dof)
         return list(correlated_values(joint.values.tolist(), joint.covariance, [name] * joint.values.size))
 
-    def add_alternatives(self, name: str, weights: Mapping[str, float]) -> dict[str, Any]:
-        """Return a variable z_i of mean 0 and variance w_i for each alternative; they are one line in every budget.
-
-        If a result x would be x_i under the alternative i, it is written as x + sum_i (x_i - x) z_i. Its variance then
-        includes sum_i w_i (x_i - x)^2, and results that an alternative changes together are correlated.
-        """
+    def add_errors(self, name: str, sizes: Mapping[str, float]) -> dict[str, Any]:
+        """Return a variable of mean 0 for each standard uncertainty; they are one line in every budget."""
         from uncertainties import ufloat
 
         self._register(name, "B")
-        return {key: ufloat(0.0, math.sqrt(w), name) if w > 0 else 0.0 for key, w in weights.items()}
+        return {key: ufloat(0.0, u, name) if u > 0 else 0.0 for key, u in sizes.items()}
 
     def budget(self, quantity: str, x: Any, unit: str) -> Budget:
         """Return the budget of a result calculated from these inputs."""
@@ -131,26 +125,15 @@ class Inputs:
         lines = []
         for name, variance in sorted(variances.items(), key=lambda item: (-item[1], item[0])):
             if variance > 1e-12 * whole:  # smaller values are rounding errors of dependences that cancel
-                given = self._single.get(name)
+                kind, dof, given = self._inputs[name]
                 slope = None if given is None else slopes[name]
-                u, share = math.sqrt(variance), variance / whole
-                lines.append(
-                    Contribution(
-                        name=name,
-                        kind=self._kinds[name],
-                        input=given,
-                        sensitivity=slope,
-                        u=u,
-                        share=share,
-                        dof=self._dofs[name],
-                    )
-                )
+                lines.append(Contribution(name, kind, given, slope, math.sqrt(variance), variance / whole, dof))
         return Budget(quantity, Estimate.of_variable(x, unit, math.sqrt(whole)), tuple(lines))
 
-    def _register(self, name: str, kind: Evaluation, dof: float = math.inf) -> None:
-        if name in self._kinds:
+    def _register(self, name: str, kind: Evaluation, dof: float = math.inf, estimate: Estimate | None = None) -> None:
+        if name in self._inputs:
             raise ValueError(f"an input {name!r} is there already")
-        self._kinds[name], self._dofs[name] = kind, max(dof, 1.0)
+        self._inputs[name] = kind, max(dof, 1.0), estimate
 
 
 def joint_of(estimates: Mapping[str, Estimate]) -> Joint:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.bench.instrument import Instrument
+from pipeline.bench.clock_rate import clock_rate
 from pipeline.bench.scene import Scene
 from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.bench.spring import unstated_spring_kg
@@ -38,10 +38,6 @@ from pipeline.results.effects import Effect
 from pipeline.results.formulas import solve
 from pipeline.track import F8, UNUSABLE, Quality, Track
 from pipeline.windows.demodulate import Windows
-
-# Standard uncertainty of an air temperature stated without one, K; the limit of error of a resistance thermometer of
-# class B is 0.4 K at 20 degrees (IEC 60751).
-U_AIR_TEMPERATURE_K = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,10 +124,10 @@ def derive(
     Results that depend on the damping law are averages over laws (:func:`pipeline.damping.average.average_over_laws`):
     :math:`x = \\sum_i w_i x_i` and :math:`u^2 = \\sum_i w_i (u_i^2 + (x_i - x)^2)`.
     """
-    inputs, instrument = Inputs(), Instrument.of(track)
+    inputs = Inputs()
     if not isinstance(motion, Oscillation):
         of_scene = _of_scene(track, scene, {"added_mass", "spring_mass"}, inputs)
-        every = _closed(motion, instrument, of_scene, inputs, track.unit)
+        every = _closed(motion, track, of_scene, inputs)
         return _derived(every, inputs, track.unit)
     laws = _Laws(motion.damping, inputs, motion.windows)
     of_scene = _of_scene(track, scene, {effect.name for effect in effects if effect.included}, inputs)
@@ -161,15 +157,15 @@ def _derived(every: Mapping[str, Any], inputs: Inputs, unit: str) -> Derived:
 
 
 def _closed(
-    motion: Relaxation | TwoModes | Rest, instrument: Instrument, of_scene: dict[str, Any], inputs: Inputs, unit: str
+    motion: Relaxation | TwoModes | Rest, track: Track, of_scene: dict[str, Any], inputs: Inputs
 ) -> dict[str, Any]:
     """Return the results of a motion without laws, with the clock, scale and zero of the instrument."""
-    rate, scale = inputs.add("clock_rate", instrument.clock_rate, "B"), of_scene["distance_scale"]
+    rate, scale = inputs.add("clock_rate", clock_rate(track).rate, "B"), of_scene["distance_scale"]
     x = dict(zip(motion.joint.names, inputs.add_joint("fitted_motion", motion.joint, motion.dof), strict=True))
     known = {
         "time_factor": rate,
         "rest_position": x["rest"],
-        "sensor_zero": inputs.add("sensor_zero", Estimate(0.0, instrument.u_offset_m, unit), "B"),
+        "sensor_zero": inputs.add("sensor_zero", Estimate(0.0, track.u_offset_m, track.unit), "B"),
         "offset_misfit": 0.0,
         "noise_of_samples": inputs.add("noise", motion.noise, "A", motion.dof),
     }
@@ -208,7 +204,7 @@ def _of_motion(
 ) -> dict[str, Any]:
     """Return the inputs of the formulas that the recording and its fit give; None for what they do not determine."""
     windows, damping, phase, rest = fitted.windows, fitted.damping, fitted.phase, fitted.rest
-    instrument, unit, amiss = Instrument.of(track), track.unit, _amiss(misfits, inputs)
+    unit, amiss = track.unit, _amiss(misfits, inputs)
 
     def less_certain(name: str, value: float) -> Any:
         """Return a factor of mean 1 that adds the uncertainty from the misfits to an estimate of this value."""
@@ -224,7 +220,7 @@ def _of_motion(
         "phase_slope": slope,
         "small_swings": None if small is None else inputs.add("small_swings", small, "A", free),
         "squared_rate": fitted.squared_rate,
-        "time_factor": inputs.add("clock_rate", instrument.clock_rate, "B") * (1.0 + amiss["clock"]),
+        "time_factor": inputs.add("clock_rate", clock_rate(track).rate, "B") * (1.0 + amiss["clock"]),
         "amplitude_factor": less_certain("amplitude", laws.values[0]),
         "rate_factor": less_certain("damping_rate", laws.values[1]),
         "law": laws.coefficients,
@@ -236,7 +232,7 @@ def _of_motion(
         "crest": _crest(fitted, unit, inputs),
         "stiffness_factor": 1.0 + 2.0 * inputs.add("mean_frequency", Estimate(0.0, apart, ""), "B") if apart else 1.0,
         "rest_position": inputs.add("rest_position", rest.mean, "A", free),
-        "sensor_zero": inputs.add("sensor_zero", Estimate(0.0, instrument.u_offset_m, unit), "B"),
+        "sensor_zero": inputs.add("sensor_zero", Estimate(0.0, track.u_offset_m, unit), "B"),
         "offset_misfit": amiss["offset"],
         "start_phase": _start_phase(phase, slope, inputs, free),
         "phase_misfit": amiss["phase"],
@@ -251,7 +247,7 @@ def _of_motion(
 
 def _of_scene(track: Track, scene: Scene, included: set[str], inputs: Inputs) -> dict[str, Any]:
     """Return the inputs of the formulas that the scene gives; None for what it does not state."""
-    air = Ambient(scene, inputs, u_temperature_k=U_AIR_TEMPERATURE_K)
+    air = Ambient(scene, inputs)
 
     def stated(name: str, value: Estimate | None) -> Any:
         return None if value is None else inputs.add(name, value, "B")
@@ -261,7 +257,7 @@ def _of_scene(track: Track, scene: Scene, included: set[str], inputs: Inputs) ->
     return {
         "air": air,
         "known_air": air if air.known else None,
-        "distance_scale": air.scale(Instrument.of(track)) if track.unit == "m" else 1.0,
+        "distance_scale": air.scale(track) if track.unit == "m" else 1.0,
         "sensor_filter": _filter(SensorFilter.of(scene, track.rate_hz), inputs),
         "pendulum_length": stated("pendulum_length", scene.pendulum_length_m),
         "disc_diameter": stated("disc_diameter", scene.disc_diameter_m),
@@ -291,16 +287,8 @@ def _amiss(misfits: tuple[Misfit, ...], inputs: Inputs) -> Mapping[str, Any]:
     """Return the misfits as inputs: a variable of mean zero for each estimate, by name."""
     by_name: dict[str, Any] = defaultdict(float)
     for misfit in misfits:
-        sizes = {
-            "amplitude": misfit.amplitude,
-            "offset": misfit.offset,
-            "phase": misfit.phase_rad,
-            "damping_rate": misfit.damping_rate,
-            "clock": misfit.clock,
-        }
-        variables = inputs.add_alternatives(misfit.name, {name: size**2 for name, size in sizes.items()})
-        for name, variable in variables.items():
-            by_name[name] = by_name[name] + variable
+        for name, variable in inputs.add_errors(misfit.name, misfit.sizes).items():
+            by_name[name] += variable
     return by_name
 
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.bench.air import speed_of_sound
+from pipeline.bench.clock_rate import ClockRate, clock_rate
 from pipeline.bench.disc import SOURCES, DerivedDrag, added_mass_kg, disc_rate, scene_air, scene_air_density
-from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import GRAVITY_M_PER_S2, HEAVIEST_SHARE, oscillating_mass_kg
 from pipeline.damping.laws.drag import amplitudes
@@ -48,9 +48,9 @@ class Effect:
 
 def tabulate(track: Track, fitted: Oscillation, scene: Scene) -> tuple[Effect, ...]:
     """Return the effects table of an analysis."""
-    phase, damping, unit, instrument = fitted.phase, fitted.damping, track.unit, Instrument.of(track)
+    phase, damping, unit, clock = fitted.phase, fitted.damping, track.unit, clock_rate(track)
     omega = phase.angular_frequency
-    u_k = 2.0 * math.hypot(omega.u / omega.value, instrument.clock_rate.u)
+    u_k = 2.0 * math.hypot(omega.u / omega.value, clock.rate.u)
     if scene.bob_mass_kg is not None:
         u_k = math.hypot(u_k, scene.bob_mass_kg.u / scene.bob_mass_kg.value)
 
@@ -67,8 +67,8 @@ def tabulate(track: Track, fitted: Oscillation, scene: Scene) -> tuple[Effect, .
         _bend(fitted),
         _rest_drift(fitted.rest, fitted.windows.noise),
         *_modes(fitted.modes, unit),
-        *((_buoyancy(scene, omega.value, 1.0, "m"), _speed_of_sound(scene, instrument)) if unit == "m" else ()),
-        _clock_rate(instrument),
+        *((_buoyancy(scene, omega.value, 1.0, "m"), _speed_of_sound(scene, track)) if unit == "m" else ()),
+        _clock_rate(clock),
     )
 
 
@@ -92,14 +92,14 @@ def simulated_effects(scene: Scene, problem: Problem, seconds: float, drag: Deri
     softer = f"the air's u of {u_kelvin:g} K makes a steel spring softer by {SOFTER_PER_K * u_kelvin:.1g}"
     swings = (
         f"the scene gives no length; suspended {length:.3g} m +- {1.5 * start:.2g} m below its point the bob would "
-        f"swing sideways at half the frequency (2:1), growing by {0.375 * omega * start / length:.2g} 1/s"
+        "swing sideways at half the frequency (2:1), and a small swing would grow at this rate"
     )
     return (
         *_masses(scene, moved),
         _disc(scene, problem, seconds, drag),
         *_forces(problem, seconds),
         Effect("temperature", turned(SOFTER_PER_K * u_kelvin), None, "1", False, softer),
-        Effect("sideways_mode", None, None, "1", False, swings),
+        Effect("sideways_mode", 0.375 * omega * start / length, None, "1/s", False, swings),
         _buoyancy(scene, omega, start, "1"),
     )
 
@@ -235,11 +235,11 @@ def _buoyancy(scene: Scene, omega: float, length_m: float, unit: str) -> Effect:
     return Effect("buoyancy", shift / length_m if length_m > 0.0 else None, None, unit, False, why)
 
 
-def _speed_of_sound(scene: Scene, instrument: Instrument) -> Effect:
-    record, shift = instrument.speed_of_sound_m_per_s or SPEED_OF_SOUND_OF_RECORD, None
-    if instrument.u_scale > 0:
+def _speed_of_sound(scene: Scene, track: Track) -> Effect:
+    record, shift = track.speed_of_sound_m_per_s or SPEED_OF_SOUND_OF_RECORD, None
+    if track.u_scale > 0:
         why = "the distances were calibrated, so the calibration's uncertainty stands in its place"
-    elif not instrument.sonic and not scene.tells_of_sensor:
+    elif not track.sonic and not scene.tells_of_sensor:
         why = "no rangefinder is known, so its 0.18 %/K stand in no uncertainty; [sensor] in the scene adds them"
     elif scene.air_temperature_c is None:
         why = "the scene gives no air temperature, so a room's 20 +- 3 degC count, 0.5 % in the scale"
@@ -252,7 +252,6 @@ def _speed_of_sound(scene: Scene, instrument: Instrument) -> Effect:
     return Effect("speed_of_sound", shift, None, "1", shift is not None, why)
 
 
-def _clock_rate(instrument: Instrument) -> Effect:
-    rate = instrument.clock_rate
-    shift = None if rate.value == 1.0 else rate.value - 1.0
-    return Effect("clock_rate", rate.u, shift, "1", True, instrument.clock_words)
+def _clock_rate(clock: ClockRate) -> Effect:
+    shift = None if clock.rate.value == 1.0 else clock.rate.value - 1.0
+    return Effect("clock_rate", clock.rate.u, shift, "1", True, clock.words)

@@ -34,6 +34,7 @@ from springmass.result.output_names import distinct_names, make_folder
 from springmass.result.run_json import RESULT_SCHEMA, plain, provenance_of, rejected
 from springmass.runs.run import Run
 from springmass.runs.tasks import Task, analysed, law_lines
+from springmass.typeset import count
 
 if TYPE_CHECKING:
     from springmass.course.benches import CourseComparison
@@ -172,11 +173,10 @@ def _course_text(comparison: CourseComparison) -> str:
         within = "one run a bench" if math.isnan(group.within) else f"{group.within:.2g} within a bench"
         benches = f"{group.between:.2g} between {group.benches} benches"
         between = "one bench" if math.isnan(group.between) else benches
-        runs = f"{group.runs} run{'s' if group.runs > 1 else ''}"
-        lines.append(f"  {runs}; scatter {within} (stated {group.stated:.2g}), {between}")
+        lines.append(f"  {count(group.runs, 'run')}; scatter {within} (stated {group.stated:.2g}), {between}")
     if any(group.quantity == "drag_coefficient" for group in comparison.agreements):
         lines.append("a drag coefficient counts all damping as drag of the disc, that of spring and hook too")
-    laws = ", ".join(f"{law} {count}" for law, count in comparison.laws.items())
+    laws = ", ".join(f"{law} {runs}" for law, runs in comparison.laws.items())
     lines += ["", f"damping laws selected: {laws}"] if laws else []
     differing = comparison.suspects
     lines += ["", f"runs that differ from their course: {len(differing)}"] if differing else []

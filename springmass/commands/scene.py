@@ -13,43 +13,6 @@ from springmass.errors import HINT, LOG, OK, UNREADABLE, ProgramError, of_severa
 from springmass.loading.inputs import files_of
 from springmass.loading.options import LoadOptions
 
-SCENE_TEMPLATE = """\
-# What was at the bench. Remove the # before what you measured, and put your numbers for the dots.
-# { value = ..., u = ... } states a standard uncertainty; a plain number counts as exact. What is not known is not used.
-
-[bob]
-# mass_kg = { value = ..., u = ... }        # kg, such as 0.2007 and 0.0001: all that hangs on the spring, disc included
-
-[spring]
-# mass_kg = { value = ..., u = ... }        # kg, such as 0.0104 and 0.0001: a third of it swings along
-# constant_n_per_m = ...                    # for springmass simulate; an analysis measures it
-# none = true                               # no spring bears the bob: a torsion balance, a light spot, a beam
-
-[pendulum]
-# length_m = { value = ..., u = ... }       # m, from the pivot to the middle of the bob: its angle gives g
-
-[disc]
-# diameter_m = { value = ..., u = ... }     # m, such as 0.102 and 0.0005
-
-[air]
-# temperature_c = { value = ..., u = ... }  # degrees C: it sets the speed of sound, the scale of a rangefinder
-# pressure_pa = ...                         # 101325 if it is not stated
-# relative_humidity = ...                   # 0 to 1, 0.5 if it is not stated
-
-[sensor]
-# position = "below"                        # of a rangefinder: "below" or "above" the bob
-# mean_samples = ...                        # it gives the mean of its last so many distances
-# lag_s = { value = ..., u = ... }          # s, or it follows with a first-order lag
-
-# For springmass simulate and record --simulate; an analysis measures these:
-# [start]
-# displacement_m = ...                      # m, such as 0.05
-# [damping]                                 # dA/dt = -(mu + gamma A + beta A^2)
-# gamma_per_s = ...                         # such as 0.0073
-# beta_per_m_s = ...                        # such as 0.235
-# mu_m_per_s = ...
-"""
-
 
 def _mark(text: str) -> tuple[float, str]:
     seconds, equals, words = text.partition("=")
@@ -94,15 +57,13 @@ def scene(
         checked = read_scene(check)
         ask_about(checked, check)
         print(visible(f"{check}: a scene that states {stated_keys(checked)}"))
-        if checked == Scene():
-            LOG.log(HINT, f"write what you measured into {check}, and remove the # before it")
-            return OK
-        LOG.log(HINT, f"springmass analyse RECORDING --scene {shlex.quote(str(check))}")
+        todo = f"write what you measured into {check}, and remove the # before it"
+        LOG.log(HINT, todo if checked == Scene() else f"springmass analyse RECORDING --scene {shlex.quote(str(check))}")
         return OK
     if not recordings:
         if noted:
             raise ProgramError("--scene, --note, --mark and options of reading belong to a recording", "name it")
-        print(SCENE_TEMPLATE, end="")
+        print(Path(__file__).with_name("scene_template.toml").read_text("utf-8"), end="")
         LOG.log(HINT, "springmass scene > bench.toml, fill it in, springmass scene --check bench.toml")
         return OK
     if not noted:

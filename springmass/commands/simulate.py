@@ -140,7 +140,8 @@ def _acting(effects: Sequence[Effect]) -> list[str]:
     """Return the effects with their sizes, and whether each is in the equation."""
     lines = ["effects          change of the motion, of the amplitude"]
     for effect in effects:
-        size = "" if effect.predicted is None else f"{effect.predicted:.2g}"
+        unit = "" if effect.unit == "1" else f" {effect.unit}"
+        size = "" if effect.predicted is None else f"{effect.predicted:.2g}{unit}"
         mark = "in " if effect.included else "out"
         lines.append(wrapped(f"  {mark}  {EFFECTS[effect.name]:<38} {size:>8}  {effect.why}", " " * 56))
     return lines

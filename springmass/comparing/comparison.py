@@ -168,7 +168,6 @@ def demand_one_spring(scenes: Sequence[tuple[str, Scene]]) -> None:
         raise ProgramError(
             f"compare needs the mass of every run's bob; none is stated for {', '.join(missing)}",
             "give --scene FILE, one for all runs or one for each in their order",
-            between=": ",
         )
     first, *others = scenes
     for name, scene in others:
@@ -177,7 +176,6 @@ def demand_one_spring(scenes: Sequence[tuple[str, Scene]]) -> None:
                 f"compare takes runs of one spring; [spring] mass_kg is {first[1].spring_mass_kg or 'not given'} for "
                 f"{first[0]} and {scene.spring_mass_kg or 'not given'} for {name}",
                 "state the same in both scenes",
-                between=": ",
             )
 
 
@@ -326,10 +324,9 @@ def _of_one_bob(motions: list[tuple[str, Oscillation]], scenes: list[Scene]) -> 
     The bob must be the same because the damping coefficients are inversely proportional to the mass.
     """
     groups: dict[tuple[Estimate | None, Estimate | None, str], list[tuple[str, Oscillation]]] = {}
-    for named_motion, scene in zip(motions, scenes, strict=True):
-        groups.setdefault((scene.bob_mass_kg, scene.disc_diameter_m, named_motion[1].rest.mean.unit), []).append(
-            named_motion
-        )
+    for (name, motion), scene in zip(motions, scenes, strict=True):
+        bob = (scene.bob_mass_kg, scene.disc_diameter_m, motion.rest.mean.unit)
+        groups.setdefault(bob, []).append((name, motion))
     return [group for group in groups.values() if len(group) > 1]
 
 

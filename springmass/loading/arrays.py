@@ -149,9 +149,7 @@ def _by_headings(frame: Any) -> tuple[_ArrayColumn, _ArrayColumn]:
     others = [(name, unit) for name, words, unit in headings if not is_time(words)]
     if len(times) != 1 or len(others) != 1:
         named = ", ".join(repr(name) for name, *_ in headings)
-        raise TrackError(
-            f"one column of times and one of values were expected, got {named}", "choose two of them", between=": "
-        )
+        raise TrackError(f"one column of times and one of values were expected, got {named}", "choose two of them")
     return _ArrayColumn(frame[times[0][0]], times[0][1]), _ArrayColumn(frame[others[0][0]], others[0][1])
 
 
@@ -162,9 +160,7 @@ def _index_of(source: Any) -> Any:
     import pandas as pd
 
     if isinstance(source.index, pd.RangeIndex):
-        raise TrackError(
-            "its index counts rows and is no time", 'give times as its index, or as a column "time"', between=": "
-        )
+        raise TrackError("its index counts rows and is no time", 'give times as its index, or as a column "time"')
     return source.index
 
 
@@ -179,9 +175,7 @@ def _unit_of(values: Any) -> str:
 def _measure(unit: str) -> units.Measure:
     measure = units.measure_of(unit.replace("**", "^").replace(" ", ""))
     if measure is None:
-        raise TrackError(
-            f"unknown unit {unit!r} of the values", f"give unit=, one of {', '.join(units.MEASURES)}", between=": "
-        )
+        raise TrackError(f"unknown unit {unit!r} of the values", f"give unit=, one of {', '.join(units.MEASURES)}")
     return measure
 
 
@@ -189,11 +183,11 @@ def _numbers(values: Any, what: str) -> F8:
     """Return numbers as an array; masked values are missing, and complex ones are refused."""
     plain = np.ma.asarray(getattr(values, "magnitude", values))
     if plain.dtype.kind == "c":
-        raise TrackError(f"{what} are complex numbers", "give their real part, or their absolute value", between=": ")
+        raise TrackError(f"{what} are complex numbers", "give their real part, or their absolute value")
     try:
         return np.asarray(np.ma.filled(plain.astype(np.float64), np.nan))
     except (TypeError, ValueError):
-        raise TrackError(f"{what} are no numbers, but {plain.dtype}", "convert them first", between=": ") from None
+        raise TrackError(f"{what} are no numbers, but {plain.dtype}", "convert them first") from None
 
 
 def _seconds(t: Any, unit: str) -> F8:
@@ -211,7 +205,5 @@ def _seconds(t: Any, unit: str) -> F8:
         return np.asarray(times / np.timedelta64(1, "s"), np.float64)
     measure = units.time_unit(unit or "s")
     if measure is None:
-        raise TrackError(
-            f"unknown unit {unit!r} of the times", f"give time_unit=, one of {', '.join(units.TIMES)}", between=": "
-        )
+        raise TrackError(f"unknown unit {unit!r} of the times", f"give time_unit=, one of {', '.join(units.TIMES)}")
     return np.asarray(_numbers(t, "times") * (10.0**measure.power * measure.factor))

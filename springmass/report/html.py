@@ -177,7 +177,7 @@ def _reported_words(compared: SpringComparison) -> str:
 
 
 _INDEXES = [q.page_symbol.replace(" ", "_") for q in QUANTITIES.values() if " " in q.page_symbol]
-_SYMBOL_WITH_INDEX = re.compile(rf"\b({'|'.join(_INDEXES)})\b")
+SYMBOL_WITH_INDEX = re.compile(rf"\b({'|'.join(_INDEXES)})\b")
 
 
 def _indexed(text: str) -> Markup:
@@ -185,7 +185,7 @@ def _indexed(text: str) -> Markup:
     from markupsafe import Markup, escape
 
     return Markup(
-        _SYMBOL_WITH_INDEX.sub(lambda found: "{}<sub>{}</sub>".format(*found[0].split("_")), str(escape(visible(text))))
+        SYMBOL_WITH_INDEX.sub(lambda found: "{}<sub>{}</sub>".format(*found[0].split("_")), str(escape(visible(text))))
     )
 
 

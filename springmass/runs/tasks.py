@@ -58,12 +58,11 @@ def attempted(task: Task, make: Callable[[], Made]) -> Made | Failed:
     where = task.source if isinstance(task.source, str | os.PathLike) else task.name or type(task.source).__name__
     try:
         return make()
-    except NeedsAnswer as error:
-        return Failed(task, _unreadable(error, error.where), error)
     except ProgramError as error:
         return Failed(task, error)
     except (AcquisitionError, StorageError) as error:
-        return Failed(task, _unreadable(error, error.where))
+        question = error if isinstance(error, NeedsAnswer) else None
+        return Failed(task, _unreadable(error, error.where), question)
     except PipelineError as error:
         return Failed(task, _unreadable(error, f"{where}: "))
     except OSError as error:
@@ -75,7 +74,7 @@ def attempted(task: Task, make: Callable[[], Made]) -> Made | Failed:
 
 
 def _unreadable(error: Error, where: str) -> ProgramError:
-    return ProgramError(error.problem, error.remedy, where=where, between=error.between, exit_code=UNREADABLE)
+    return ProgramError(error.problem, error.remedy, where=where, exit_code=UNREADABLE)
 
 
 def analysed(tasks: Iterable[Task]) -> list[Run]:

@@ -42,7 +42,7 @@ def findings_text(
     if not full:
         more = len(warnings) - WARNINGS_SHOWN
         if more > 0:
-            lines.append(f"and {more} more {'warning' if more == 1 else 'warnings'}: --full")
+            lines.append(f"and {count(more, 'more warning')}: --full")
         return "\n".join(lines or ["No warnings."])
     lines += [_finding_line(f, written) for f in notes if not is_standing(f)]
     if standing := [f["code"] for f in notes if is_standing(f)]:

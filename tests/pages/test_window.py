@@ -192,7 +192,13 @@ def test_a_run_file_restores_its_card(window: Page, tmp_path: Path) -> None:
     k = row_of(card, "spring constant")
     card.get_by_label("Notes for this recording").fill("third spring")
     card.get_by_label("Notes for this recording").blur()
-    for name, end in (("Table as CSV", ".csv"), ("Table for LaTeX", ".tex"), ("Save run file", ".h5")):
+    ways = (
+        ("Amplitudes as CSV", ".csv"),
+        ("Table as CSV", ".csv"),
+        ("Table for LaTeX", ".tex"),
+        ("Save run file", ".h5"),
+    )
+    for name, end in ways:
         with window.expect_download() as download:
             card.get_by_role("button", name=name).click()
         assert download.value.suggested_filename.endswith(end)

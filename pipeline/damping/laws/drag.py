@@ -140,34 +140,16 @@ def _flow(t: F8, start: float, mu: float, gamma: float, beta: float) -> _Flow:
         cosh = 0.5 * fall + 0.5
         numerator = (start if gamma < 0.0 else start * fall) - (mu + lesser * start) * sinh
         denominator = (fall if gamma < 0.0 else 1.0) + (lesser + beta * start) * sinh
-        if numerator.min() > 0.0 and denominator.min() > 0.0:
-            return _Flow(
-                amplitude=numerator / denominator,
-                denominator=denominator,
-                cosh=cosh,
-                sinh=sinh,
-                fall=fall,
-                square=square,
-                ends=None,
-            )
-        # If beta is not negative, the amplitude reaches zero before a pole, which lies at negative amplitudes.
-        lost = (denominator <= 0.0) & (beta < 0.0)
-        ends = np.where(lost, np.inf, np.where((numerator <= 0.0) | (denominator <= 0.0), 0.0, np.nan))
+        ends = None
+        if not (numerator.min() > 0.0 and denominator.min() > 0.0):
+            # If beta is not negative, the amplitude reaches zero before a pole, which lies at negative amplitudes.
+            lost = (denominator <= 0.0) & (beta < 0.0)
+            ends = np.where(lost, np.inf, np.where((numerator <= 0.0) | (denominator <= 0.0), 0.0, np.nan))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         amplitude = numerator / denominator
-    if np.isnan(ends).all():
-        return _Flow(
-            amplitude=amplitude, denominator=denominator, cosh=cosh, sinh=sinh, fall=fall, square=square, ends=None
-        )
-    return _Flow(
-        amplitude=np.where(np.isnan(ends), amplitude, ends),
-        denominator=denominator,
-        cosh=cosh,
-        sinh=sinh,
-        fall=fall,
-        square=square,
-        ends=ends,
-    )
+    if ends is not None:
+        amplitude = np.where(np.isnan(ends), amplitude, ends)
+    return _Flow(amplitude, denominator, cosh, sinh, fall, square, ends)
 
 
 def _turning_ends(pace: float, angle: F8, start: float, mu: float, gamma: float, beta: float) -> F8:

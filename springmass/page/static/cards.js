@@ -44,6 +44,12 @@ function term(words, text) {
   return [`${words} `, button];
 }
 
+// A symbol in a sentence, as T_s, with its index lower.
+function lowered(symbol) {
+  const [letter, index] = symbol.split("_");
+  return [letter, element("sub", index)];
+}
+
 function draw_chart(figure, chart) {
   const box = element("div", "", { className: "chart", id: new_id() });
   figure.replaceChildren(box, ...(chart.caption ? [element("figcaption", [element("b", `${chart.title}. `), chart.caption])] : []));
@@ -216,9 +222,9 @@ class RecordingCard {
 
   // What a person takes away is made first, then loaded; a report opens in a tab of its own.
   make_away() {
-    const ways = [["Open report", "report", "report"], ["Table as CSV", "report", "results.csv"], ["Table for LaTeX", "report", "table.tex"], ["Figures as PNG and SVG", "figures", "figures.zip"], ["Save run file", "run", "run.h5"]];
+    const ways = [["Open report", "report", "report"], ["Table as CSV", "report", "results.csv"], ["Amplitudes as CSV", "report", "amplitude.csv"], ["Table for LaTeX", "report", "table.tex"], ["Figures as PNG and SVG", "figures", "figures.zip"], ["Save run file", "run", "run.h5"]];
     const place = this.at(".away .card-buttons"), notes = this.at(".away textarea"), table = this.at("table.results");
-    place.append(...ways.map(([words, what, file]) => makeButton(words, async (button) => {
+    const buttons = ways.map(([words, what, file]) => makeButton(words, async (button) => {
       const address = `/window/cards/${this.id}/${file}`, tab = file === "report" ? open("about:blank") : null;
       button.disabled = true;
       const made = await act("write", { card: this.id, what });
@@ -226,7 +232,9 @@ class RecordingCard {
       if (!made) tab?.close();
       else if (tab) tab.location = address;
       else element("a", "", { href: address, download: "" }).click();
-    })), makeButton("Copy for a spreadsheet", async (button) => {
+    }));
+    this.amplitudes = buttons[2];
+    place.append(...buttons, makeButton("Copy for a spreadsheet", async (button) => {
       const done = await copyText(["quantity\tvalue\tu\tunit", ...[...table.querySelectorAll("tbody tr")].map((line) => `${line.dataset.quantity}\t${line.dataset.cells.replaceAll("|", "\t")}`)].join("\n"));
       button.textContent = done ? "Copied" : "Not allowed by the browser";
       setTimeout(() => { button.textContent = "Copy for a spreadsheet"; }, 1500);
@@ -279,10 +287,11 @@ class RecordingCard {
     this.at(".outline").hidden = true;
     const words = this.at(".words");
     words.hidden = false;
-    words.replaceChildren(...found.summary.map(([title, text]) => element("p", [element("b", `${title}. `), text])));
+    words.replaceChildren(...found.summary.map(([title, parts]) => element("p", [element("b", `${title}. `), ...parts.flatMap((part, i) => (i % 2 ? lowered(part) : part))])));
     this.show_findings(found.findings);
     this.at(".reported").hidden = this.at(".away").hidden = false;
     const at_once = found.charts.filter(({ name }) => ["position", "amplitude", "spectrum"].includes(name)), others = found.charts.filter((chart) => !at_once.includes(chart));
+    this.amplitudes.hidden = !at_once.some(({ name }) => name === "amplitude");
     this.draw_all(this.at(".shown"), at_once);
     const fold = this.at(".more"), place = fold.querySelector(".figures");
     fold.hidden = !others.length;

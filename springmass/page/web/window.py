@@ -20,7 +20,8 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from springmass.loading.load import sample_data
 from springmass.page.web.security import ACT, Access
 from springmass.page.web.server import page_of, server_of, static_files
-from springmass.page.window.cards import Cards, NotTaken
+from springmass.page.window.cards import Cards, NotTaken, checked
+from springmass.page.window.processes import prepare
 from springmass.page.window.recording import ports
 
 DESERTED_S, FIRST_S = 60.0, 600.0
@@ -28,7 +29,7 @@ DESERTED_S, FIRST_S = 60.0, 600.0
 LONGEST_REQUEST = 1 << 18
 OWN_HEADER = ("x-springmass", "window")
 """A header that no page of another origin can send without being asked first, and the answer to that is no."""
-TAKEN = {name: f"report/{name}" for name in ("results.csv", "table.tex", "results.json")} | {
+TAKEN = {name: f"report/{name}" for name in ("results.csv", "amplitude.csv", "table.tex", "results.json")} | {
     name: name for name in ("figures.zip", "run.h5")
 }
 SHOWN = {"shown": "results.json", "report": "report/report.html"}
@@ -38,10 +39,10 @@ ACTIONS: Mapping[str, Callable[[Cards, str, Mapping[str, Any]], Any]] = {
     "examples": lambda cards, *_: cards.examples(sample_data()),
     "change": lambda cards, card, asked: cards.change(card, asked["changes"]),
     "separate": lambda cards, card, _: cards.separate(card),
-    "stop": lambda cards, card, _: cards.stop(card),
+    "stop": lambda cards, card, _: cards.children.forget(card, "You stopped it"),
     "remove": lambda cards, card, _: cards.remove(card),
     "write": lambda cards, card, asked: cards.write(card, str(asked["what"])),
-    "judge": lambda cards, card, asked: cards.judge(card, asked["rows"]),
+    "judge": lambda cards, card, asked: cards.of_card(card, "judge", rows=checked("rows", asked["rows"])),
     "compare": lambda cards, _, asked: cards.compare(asked),
     "ports": lambda *_: ports(),
     "record": lambda cards, _, asked: cards.record(asked),
@@ -95,7 +96,7 @@ class Window:
 
     async def reading(self, over: Callable[[], None]) -> None:
         """Call ``over`` once no page has been there for a while and nothing is recorded."""
-        self._cards.children.prepare()
+        prepare()
         while True:
             await asyncio.sleep(1.0)
             busy = self._cards.look()
@@ -185,7 +186,7 @@ def serve_window(cards: Cards, begin: Callable[[], None], *, port: int, opened: 
                 yield
             finally:
                 ticking.cancel()
-                await cards.close()
+                cards.close()
 
         # A page whose computer sleeps does not answer, and is not gone.
         server = server_of(application(window, cards, life), access, ping_s=None)

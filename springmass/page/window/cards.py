@@ -10,7 +10,7 @@ import re
 import secrets
 import shutil
 import time
-from collections.abc import AsyncIterator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,6 @@ KEPT_S = 24 * 3600.0
 ALIVE_S = 60.0
 """A window whose folder was not touched for so long has ended; it touches it every second."""
 LONGEST_NOTE = 4000
-TOO_MUCH = "Unpacked, this archive would exceed 1 GB or 200 files together"
 SETTLED = ("done", "question", "failed")
 """Stages of a card that wait for a person."""
 _UNSET = dict.fromkeys(("velocity", "scene", "from_s", "to_s", "law", "accuracy"))
@@ -147,9 +146,9 @@ class Cards:
         except (ProgramError, OSError) as error:
             raise NotTaken(str(error)) from error
 
-    async def close(self) -> None:
+    def close(self) -> None:
         """End all processes; cards that are not saved stay for a day."""
-        await self.children.close()
+        self.children.close()
         if all(card.kept["saved"] for card in self.cards.values()):
             shutil.rmtree(self.folder, ignore_errors=True)
 
@@ -183,11 +182,9 @@ class Cards:
         return place
 
     def _room(self) -> tuple[int, int]:
-        """Return how many files and bytes may still be added; an archive counts with what is inside."""
+        """Return how many files and bytes may still be added."""
         sizes = [path.stat().st_size for path in self.folder.glob("**/files-*/*") if path.is_file()]
-        inside = [card.state.get("inside", (0, 0)) for card in self.cards.values()]
-        files, size = (sum(numbers) for numbers in zip((0, 0), *inside, strict=True))
-        return MOST_FILES - len(sizes) - files, MOST_TOGETHER - sum(sizes) - size
+        return MOST_FILES - len(sizes), MOST_TOGETHER - sum(sizes)
 
     async def open_drop(self, drop: str, on: str = "") -> None:
         """Open the files of a drop as cards; a scene among them is that of the card that it fell on, or of all."""
@@ -254,7 +251,7 @@ class Cards:
         Answers and cells of the bench replace those of their name alone: a page may not have seen the last change yet.
         """
         card = self.card(wanted)
-        taken = {name: _checked(name, value) for name, value in changes.items()}
+        taken = {name: checked(name, value) for name, value in changes.items()}
         for name in {"answers", "bench"} & taken.keys():
             taken[name] = {each: text for each, text in (card.kept[name] | taken[name]).items() if text}
         card.kept |= taken | {"saved": False}
@@ -274,10 +271,6 @@ class Cards:
         card.kept["name"] += f": {runs[0]}"
         self.change(wanted, {"answers": {"run": runs[0]}})
 
-    def stop(self, wanted: str) -> None:
-        """End what a card waits for."""
-        self.children.forget(self.card(wanted).id, "You stopped it")
-
     def remove(self, wanted: str) -> None:
         """Remove a card with its files."""
         card = self.card(wanted)
@@ -290,26 +283,25 @@ class Cards:
         shutil.rmtree(card.folder, ignore_errors=True)
         self._change()
 
+    async def of_card(self, wanted: str, do: str, **more: Any) -> dict[str, Any]:
+        """Return what the process of a card answers, which writes into the folder of the card."""
+        card = self.card(wanted)
+        return await self.ask(card.id, {"do": do, "card": card.kept, "into": str(card.folder), **more}, card.size)
+
     async def write(self, wanted: str, what: str) -> None:
         """Write what a person takes away."""
-        card = self.card(wanted)
-        await self.ask(card.id, {"do": "write", "what": what, "card": card.kept, "into": str(card.folder)}, card.size)
+        await self.of_card(wanted, "write", what=what)
         if what == "run":
+            card = self.card(wanted)
             card.kept["saved"] = True
             card.keep()
             self._change(card)
-
-    async def judge(self, wanted: str, rows: Sequence[Sequence[str]]) -> dict[str, Any]:
-        """Return the verdicts on the values that a report states."""
-        card = self.card(wanted)
-        request = {"do": "judge", "rows": _checked("rows", rows), "card": card.kept, "into": str(card.folder)}
-        return await self.ask(card.id, request, card.size)
 
     async def compare(self, request: Mapping[str, Any]) -> Path:
         """Compare cards; return the file with the comparison."""
         cards = [self.card(each) for each in request["cards"]]
         asked = {"do": "compare", "cards": [card.kept for card in cards], "into": str(self.folder)}
-        asked |= {name: _checked(name, request[name]) for name in ("hooke", "columns")}
+        asked |= {name: checked(name, request[name]) for name in ("hooke", "columns")}
         await self.ask("together", asked, sum(card.size for card in cards))
         return self.folder / "comparison.json"
 
@@ -354,11 +346,7 @@ class Cards:
         """Take one answer of the process that shows a card."""
         if card.id not in self.cards:
             return
-        if "inside" in answer:
-            self._say(card, **answer)
-            if min(self._room()) < 0:
-                self.children.forget(card.id, TOO_MUCH)
-        elif "opened" in answer:
+        if "opened" in answer:
             self._say(card, stage="analysing", **answer)
         elif "results" in answer:
             self._say(card, stage="done", why=answer["why"], version=card.state["version"] + 1)
@@ -381,11 +369,15 @@ class Cards:
 
     async def _unpack(self, card: Card, otherwise: dict[str, Any]) -> None:
         """Make a card of each file of an archive; if none may be a recording, say what its reader said."""
-        place = self._new_folder()
-        with contextlib.suppress(NotTaken):
-            await self.ask("unpack", {"do": "unpack", "path": card.kept["path"], "into": str(place)}, card.size)
-        found = [*_recordings(place)]
+        place, (files, size) = self._new_folder(), self._room()
         card.kept["unpacked"] = True
+        asked = {"do": "unpack", "path": card.kept["path"], "into": str(place), "files": files, "bytes": size}
+        try:
+            await self.ask("unpack", asked, card.size)
+        except NotTaken as error:
+            self._say(card, stage="failed", problem=str(error))
+            return
+        found = [*_recordings(place)]
         if not found or card.id not in self.cards:
             await self._take(card, otherwise)
             return
@@ -447,7 +439,7 @@ def _joined(answer: Mapping[str, Any]) -> str:
     return f"{problem}. {remedy}." if remedy else f"{problem}."
 
 
-def _checked(name: str, value: Any) -> Any:
+def checked(name: str, value: Any) -> Any:
     """Return what a page sent if it has the form of this field; NotTaken for anything else."""
     match name, value:
         case "from_s" | "to_s", float() | int() | None:

@@ -1,19 +1,22 @@
-"""The process that opens the recording of a card: requests come as lines of JSON, and so do its answers.
+"""The process that opens the recording of a card, and answers requests about it over a pipe.
 
-It keeps what it has read and measured, so that a changed mass needs no new analysis of the samples. A request ends with
-an answer that has ``done``. Results go into the folder of the card, because they may be large.
+It keeps what it has read and measured, so that a changed mass needs no new analysis of the samples. After the answers
+to a request comes None. Results go into the folder of the card, because they may be large.
 """
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
 import os
-import sys
+import signal
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import chain
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
@@ -81,7 +84,6 @@ class Opened:
     def show(self, request: Request) -> Iterator[Answer]:
         """Read a recording, then analyse it; the results are complete in the file that the request names."""
         card = request["card"]
-        yield {"inside": _inside(Path(card["path"]))}
         read = self.read(card)
         yield {"opened": opened(read.loaded)}
         run, errors = self.run(card)
@@ -142,9 +144,12 @@ class Opened:
         yield {"scene": read_scene(request["path"]).to_mapping()}
 
     def unpack(self, request: Request) -> Iterator[Answer]:
-        """Write the files of an archive into a folder, under names without a path."""
+        """Write the files of an archive into a folder that has room for them, under names without a path."""
         path, folder, names = request["path"], Path(request["into"]), list[str]()
-        for name, data in members(path, read_bytes(path)):
+        files = list(members(path, read_bytes(path)))
+        if len(files) > request["files"] or sum(len(data) for _, data in files) > request["bytes"]:
+            raise ProgramError("unpacked, it would exceed 1 GB or 200 files together", "drop some of its files")
+        for name, data in files:
             names.append(plain_name(name, names))
             write_whole(folder / names[-1], data)
         yield {"names": names}
@@ -157,16 +162,6 @@ def _table(folder: Path, columns: Sequence[str], rows: Sequence[Sequence[str]]) 
     return path
 
 
-def _inside(path: Path) -> list[int]:
-    """Return how many files and bytes an archive holds; nothing for any other file."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            sizes = [each.file_size for each in archive.infolist()]
-    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):  # no archive, or one that cannot be read
-        return [0, 0]
-    return [len(sizes), sum(sizes)]
-
-
 def answers(opened_here: Opened, request: Request) -> Iterator[Answer]:
     """Yield the answers to a request; an error or a question is one of them."""
     card = request.get("card", {})
@@ -177,7 +172,6 @@ def answers(opened_here: Opened, request: Request) -> Iterator[Answer]:
             yield _why(answer, where)
             break
         yield answer
-    yield {"done": True}
 
 
 def _why(failed: Failed, where: str) -> Answer:
@@ -194,23 +188,30 @@ def _why(failed: Failed, where: str) -> Answer:
     return {"problem": problem, "remedy": remedy, "archive": archive}
 
 
-def main() -> None:
-    """Answer requests until there are no more; what a library prints goes nowhere."""
-    with os.fdopen(os.dup(1), "w", encoding="utf-8") as out, open(os.devnull, "w") as nowhere:
-        os.dup2(nowhere.fileno(), 1)
-        _warm_up()
-        here = Opened()
-        for line in sys.stdin:
-            for answer in answers(here, json.loads(line)):
-                print(json.dumps(answer), file=out, flush=True)
+def serve(requests: Connection) -> None:
+    """Answer requests until there are no more; what a library prints goes nowhere, and a request that is slow ends it.
+
+    The system ends a process whose time runs out, because nothing in it could while a library computes.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the window ends its processes
+    with open(os.devnull, "w") as nowhere:
+        for output in (1, 2):
+            os.dup2(nowhere.fileno(), output)
+    here = Opened()
+    with contextlib.suppress(EOFError):
+        while True:
+            request = requests.recv()
+            if hasattr(signal, "setitimer"):
+                signal.setitimer(signal.ITIMER_PROF, request["longest_s"])
+            for answer in chain(answers(here, request), [None]):
+                requests.send(answer)
 
 
 def _warm_up() -> None:
-    """Import what an analysis imports when it is first needed: the first recording then takes as long as the others."""
+    """Import what an analysis imports when it is first needed."""
     t = np.arange(600) / 50.0
     y = 0.2 + 0.02 * np.exp(-0.02 * t) * np.cos(8.0 * t) + 1e-4 * np.random.default_rng(1).standard_normal(t.size)
     results_of(Run.of((t, y)))
 
 
-if __name__ == "__main__":
-    main()
+_warm_up()

@@ -13,9 +13,9 @@ from springmass.charts.run import charts_of, recording
 from springmass.comparing.comparison import SpringComparison, comparison_words
 from springmass.comparing.reported import Reported
 from springmass.loading.loaded import Loaded
-from springmass.report.html import tables_of
-from springmass.report.recorded import bench_words, date_words, notes_of
-from springmass.report.words import method, summary
+from springmass.report.html import SYMBOL_WITH_INDEX, tables_of
+from springmass.report.recorded import date_words, notes_of
+from springmass.report.words import summary
 from springmass.result.advice import notices_of, sentence
 from springmass.runs.run import Run
 from springmass.typeset import cells, pretty, typeset
@@ -47,7 +47,6 @@ def opened(loaded: Loaded) -> dict[str, Any]:
         "recorded": date_words(loaded.provenance),
         "simulated": loaded.info.kind == "simulated",
         "assumed": [sentence(visible(trap.message)) for trap in loaded.traps],
-        "reading": {name: str(value) for name, value in loaded.reading.items() if name != "velocity"},
         "outline": to_json(recording(track)),
     }
 
@@ -75,7 +74,10 @@ def _field(need: MissingItem) -> dict[str, Any]:
 
 
 def results_of(run: Run) -> dict[str, Any]:
-    """Return the results of an analysed run: the table, the sentences, the findings and the charts of its report."""
+    """Return the results of an analysed run: the table, the summary, the findings and the charts of its report.
+
+    Every second part of a sentence of the summary is a symbol whose index is lowered.
+    """
     analysis = run.analysis
     charts = charts_of(analysis, notes_of(run.recorded))
     (table,) = tables_of([run])
@@ -95,14 +97,10 @@ def results_of(run: Run) -> dict[str, Any]:
             }
             for row in table["rows"]
         ],
-        "sound": table["all_sound"],
         "graded": bool(grades),
         "estimates": run.result["estimates"],
-        "summary": summary(analysis),
+        "summary": [(title, SYMBOL_WITH_INDEX.split(text)) for title, text in summary(analysis)],
         "findings": [*notices["warnings"], *notices["notes"]],
-        "method": method(analysis),
-        "bench": bench_words(analysis.scene).partition(";")[0],
-        "law": run.law,
         "charts": drawn(charts),
     }
 

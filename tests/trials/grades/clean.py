@@ -15,7 +15,7 @@ import numpy as np
 
 from pipeline.analyse import analyse
 from pipeline.bench.air import U_SOUND, speed_of_sound
-from pipeline.bench.instrument import U_CRYSTAL
+from pipeline.bench.clock_rate import U_CRYSTAL
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import oscillating_mass_kg
 from pipeline.track import Track

@@ -12,7 +12,7 @@ import pytest
 
 from pipeline.analyse import analyse
 from pipeline.bench.air import U_DENSITY, U_SOUND, U_VISCOSITY, air_density, air_viscosity, speed_of_sound
-from pipeline.bench.instrument import U_CRYSTAL
+from pipeline.bench.clock_rate import U_CRYSTAL
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.budget import Budget, Inputs, joint_of
@@ -100,7 +100,7 @@ def test_distances_carry_the_scale_and_times_the_clock() -> None:
 
 def test_the_scale_is_that_of_the_air_of_the_recording_or_of_a_calibration() -> None:
     """Distances made with 340 m/s in air of 343.9 err by the difference; a calibration replaces the air's part."""
-    old = motion(speed_of_sound_m_per_s=340.0, seconds=20.0).budgets["amplitude"]
+    old = motion(sonic=True, speed_of_sound_m_per_s=340.0, seconds=20.0).budgets["amplitude"]
     relative = part(old, "recorded_speed_of_sound") / old.estimate.value
     assert relative == pytest.approx((343.93 / 340 - 1) / math.sqrt(3), rel=0.01)
     calibrated = motion(u_scale=2e-3, u_offset_m=5e-4, seconds=20.0).budgets

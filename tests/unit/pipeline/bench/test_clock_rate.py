@@ -1,4 +1,4 @@
-"""Clock and scale of a sensor: what a comparison of clocks changes, and what it cannot."""
+"""Clock of a sensor: what a comparison of clocks changes, and what it cannot."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.bench.instrument import U_CRYSTAL, Instrument
+from pipeline.bench.clock_rate import U_CRYSTAL, clock_rate
 from pipeline.errors import TrackError
 from pipeline.track import Track
 
@@ -57,10 +57,10 @@ def track(seconds: float, **known: Any) -> Track:
 def test_a_comparison_corrects_widens_or_is_refused(case: str) -> None:
     """Beside a crystal's 50 ppm: what the clocks may differ by, what two of them cannot, and what a stall hides."""
     seconds, known, value, u, refused = CASES[case]
-    found = Instrument.of(track(seconds, **known))
-    assert found.clock_rate.value == value
-    assert found.clock_rate.u == pytest.approx(value * math.hypot(u, U_CRYSTAL))
-    assert found.clock_refused == refused
+    found = clock_rate(track(seconds, **known))
+    assert found.rate.value == value
+    assert found.rate.u == pytest.approx(value * math.hypot(u, U_CRYSTAL))
+    assert found.refused == refused
 
 
 @pytest.mark.parametrize(
@@ -78,14 +78,14 @@ def test_a_comparison_corrects_widens_or_is_refused(case: str) -> None:
 def test_impossible_uncertainties_are_refused(wrong: dict[str, float]) -> None:
     """Missing, negative or no numbers: one line, and no result."""
     with pytest.raises(TrackError, match=r"uncertainty that is not negative|finite and not negative"):
-        Instrument.of(track(1, **wrong))
+        clock_rate(track(1, **wrong))
 
 
 def test_a_stated_clock_replaces_what_is_assumed() -> None:
     """A calibration corrects every time; a bound has the u of a rectangle, where no comparison contradicts it."""
-    calibrated = Instrument.of(track(30, clock_rate=(5e-3, 1e-6), rate_error=1e-3, u_rate_error=1e-5))
-    assert calibrated.clock_rate.value == 1.005
-    assert calibrated.clock_rate.u == 1e-6
-    bound = Instrument.of(track(30, clock_limit=2e-4, u_clock=2e-4 / ROOT3))
-    assert (bound.clock_rate.value, bound.clock_rate.u) == (1.0, 2e-4 / ROOT3)
-    assert Instrument.of(track(30, clock_limit=2e-4, u_clock=1e-4, rate_error=9e-3, u_rate_error=1e-5)).clock_refused
+    calibrated = clock_rate(track(30, clock_rate=(5e-3, 1e-6), rate_error=1e-3, u_rate_error=1e-5))
+    assert calibrated.rate.value == 1.005
+    assert calibrated.rate.u == 1e-6
+    bound = clock_rate(track(30, clock_limit=2e-4, u_clock=2e-4 / ROOT3))
+    assert (bound.rate.value, bound.rate.u) == (1.0, 2e-4 / ROOT3)
+    assert clock_rate(track(30, clock_limit=2e-4, u_clock=1e-4, rate_error=9e-3, u_rate_error=1e-5)).refused
