@@ -91,16 +91,8 @@ class WindowClient(Client):
 
     def cards(self, settled: bool = True) -> list[dict[str, Any]]:
         """Return all cards as a page sees them, once none of them waits any more."""
-        from websockets.sync.client import connect
-
         until = time.monotonic() + SETTLED_S
-        origin: Any = f"http://{self.netloc}"
-        with connect(
-            f"ws://{self.netloc}/window/events",
-            origin=origin,
-            additional_headers={"Cookie": self.cookie},
-            max_size=None,
-        ) as events:
+        with self.socket("/window/events") as events:
             order, cards = None, dict[str, dict[str, Any]]()
             while time.monotonic() < until:
                 message = json.loads(events.recv(timeout=SETTLED_S))
