@@ -37,8 +37,13 @@ def _record(seed: int) -> tuple[Track, float]:
     return track, math.tau / math.sqrt(square - gamma**2)
 
 
-@pytest.mark.parametrize("seed", range(RECORDS))
-def test_the_period_of_very_small_swings_is_right_or_not_sound(seed: int) -> None:
-    """No sound T_s is more than four u off, and it is stated where the period changes by more than noise hides."""
-    track, truth = _record(seed)
-    assert said_of(analyse(track)).wrong({"period_small_swings": truth}, 4.0) == {}
+def test_the_period_of_very_small_swings_is_right_and_often_sound() -> None:
+    """No sound T_s is more than four u off, and where the frequency changes much it is sound."""
+    sound = 0
+    for seed in range(RECORDS):
+        track, truth = _record(seed)
+        said = said_of(analyse(track))
+        assert said.wrong({"period_small_swings": truth}, 4.0) == {}, seed
+        sound += "period_small_swings" in said.values and said.values["period_small_swings"].sound
+    print(f"{sound} of {RECORDS} are sound")
+    assert sound >= 0.4 * RECORDS
