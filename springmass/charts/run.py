@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.analyse import Analysis, Oscillation, Relaxation
-from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.levels import COVERAGE
 from pipeline.numerics.regression import scatter
 from pipeline.results.classic import CYCLES, Classic
-from pipeline.results.curves import Curve, Smoothed
+from pipeline.results.curves import Curve
 from pipeline.track import F8, UNUSABLE, Quality, Track
 from pipeline.units import RECORDED_UNITS, noun
 from springmass.charts.chart import (
@@ -309,12 +308,14 @@ def energy(a: Analysis) -> Chart | None:
     return Chart("energy", "Energy", caption, (above, below))
 
 
-def motion(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
+def motion(a: Analysis) -> Chart | None:
     """Velocity and acceleration, and the difference of the velocity from the fitted law in its band of u."""
-    smoothed, unit = smoothed or _smoothed(a), a.track.unit
-    if smoothed is None or (fit := a.oscillation) is None or unit not in ("m", "rad"):
+    smoothed, fit, unit = a.smoothed, a.oscillation, a.track.unit
+    if smoothed is None or fit is None or unit not in ("m", "rad"):
         return None
     rows = np.flatnonzero(np.isfinite(smoothed.position))
+    if not rows.size:
+        return None
     rows = rows[np.argsort(smoothed.t[rows], kind="stable")]
     rows = rows[:: max(1, round(a.track.rate_hz / fit.windows.cycles.frequency_hz / PER_PERIOD))]
     t, velocity, u = smoothed.t[rows], smoothed.velocity[rows], smoothed.u_velocity[rows]
@@ -422,15 +423,6 @@ def classic_method(a: Analysis, classic: Classic) -> Chart | None:
     return Chart("classic", "The lab report's method", caption, (above, below))
 
 
-def _smoothed(a: Analysis) -> Smoothed | None:
-    """Return the motion at every sample, or None if the recording does not allow it."""
-    try:
-        smoothed = a.smoothed()
-    except AnalysisError:
-        return None
-    return smoothed if np.isfinite(smoothed.position).any() else None
-
-
 CHARTS: Mapping[str, Callable[[Analysis], Chart | None]] = {
     "position": position,
     "amplitude": amplitude,
@@ -446,22 +438,13 @@ CHARTS: Mapping[str, Callable[[Analysis], Chart | None]] = {
 
 
 def charts_of(
-    a: Analysis,
-    notes: Sequence[ChartNote] = (),
-    classic: Classic | None = None,
-    smoothed: Smoothed | None = None,
-    *,
-    profiles: bool = False,
+    a: Analysis, notes: Sequence[ChartNote] = (), classic: Classic | None = None, *, profiles: bool = False
 ) -> dict[str, Chart]:
     """Return all charts that a run allows, in the report's order; only the position if nothing oscillates.
 
     ``profiles`` asks for the contour too, which may take as long as the analysis.
     """
-    makers: dict[str, Callable[[Analysis], Chart | None]] = {
-        **CHARTS,
-        "position": partial(position, notes=notes),
-        "motion": partial(motion, smoothed=smoothed),
-    }
+    makers: dict[str, Callable[[Analysis], Chart | None]] = {**CHARTS, "position": partial(position, notes=notes)}
     charts = {name: make(a) for name, make in makers.items() if profiles or name != "contour"}
     if classic is not None:
         charts["classic"] = classic_method(a, classic)
