@@ -72,8 +72,8 @@ def position(a: Analysis, notes: Sequence[ChartNote] = ()) -> Chart:
     noise, motion = a.estimates["noise"], a.motion
     sigma = pretty(Estimate(factor * noise.value, factor * noise.u, RECORDED_UNITS[track.unit].unit))
     if isinstance(motion, Relaxation):
-        grid, curve = _relaxing(a, motion)
-        series.insert(0, line_of("fit", grid, curve * factor))
+        grid = np.linspace(motion.start_s, float(np.nanmax(track.t)), 600)
+        series.insert(0, line_of("fit", grid, motion.position(grid) * factor))
     if not isinstance(motion, Oscillation):
         caption = f"The recording. Samples scatter by {sigma}."
         return Chart("position", "Position", caption, (Panel(value_label(what, track.unit), tuple(series)),))
@@ -137,12 +137,6 @@ def model_motion(motion: Oscillation, t: F8) -> tuple[F8, F8]:
     cosine, sine = np.cos(angle), np.sin(angle)
     velocity = law.law.rate(amplitude, law.joint.values) * cosine - amplitude * motion.phase.rate(amplitude, t) * sine
     return amplitude * cosine, velocity
-
-
-def _relaxing(a: Analysis, motion: Relaxation) -> tuple[F8, F8]:
-    """Return times and values of a relaxation."""
-    grid = np.linspace(motion.start_s, float(np.nanmax(a.track.t)), 600)
-    return grid, motion.position(grid)
 
 
 def _rest(a: Analysis, motion: Oscillation, factor: float) -> Panel:

@@ -38,7 +38,7 @@ FINE = 24.0  # states per radian; interpolation between them has an error of 1e-
 BAND_SHARE, LARGEST_DEFAULT = 0.01, 1e-3
 MOST_SAMPLES = 20_000_000
 REFERENCE_RTOL = 1e-13
-EULERS = (("forward-euler", "forward Euler"), ("symplectic-euler", "symplectic Euler"))
+EULERS = tuple(get_integrator(name) for name in ("forward-euler", "symplectic-euler"))
 VISIBLE_ERROR, EXACT_ERROR = 1e-3, 1e-9  # errors over the amplitude: one that is visible, and one that is called exact
 EFFECT_COLUMNS = ("name", "predicted", "measured", "unit", "included", "why")
 GROWTH_COLUMNS = ("method", "predicted", "measured", "fails_above_s")
@@ -246,11 +246,10 @@ class Simulation:
         turn = self.problem.equation.angular_frequency_per_s * self.trajectory.spacing_s
         period = max(1, round(2.0 * math.pi / turn))
         rows = []
-        for name, words in EULERS:
-            integrator = get_integrator(name)
-            predicted = math.sqrt(1.0 + turn * turn) if name == "forward-euler" else 1.0
-            measured = _measured_growth(self, integrator, period)
-            rows.append(Growth(name, words, predicted, measured, integrator.stable_step(self.problem)))
+        for euler in EULERS:
+            predicted = math.sqrt(1.0 + turn * turn) if euler.name == "forward-euler" else 1.0
+            measured = _measured_growth(self, euler, period)
+            rows.append(Growth(euler.name, euler.words, predicted, measured, euler.stable_step(self.problem)))
         return tuple(rows)
 
 
@@ -330,8 +329,7 @@ def _apart(run: Trajectory, other: Trajectory) -> float:
     return float(np.max(np.abs(run.y - other.y))) / start if start else 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Eulers:
+class Eulers(NamedTuple):
     """Both Euler methods with the step of a simulation, and the motion with which they are compared."""
 
     exact: Trajectory
@@ -350,15 +348,15 @@ def beside_exact(solved: Simulation) -> Eulers:
             run, error = better.trajectory, better.error
         if error is None or error >= EXACT_ERROR:
             words = f"solved to {error:.0e}"
-    return Eulers(run, words, tuple(_euler(solved.problem, run, name) for name, _ in EULERS))
+    return Eulers(run, words, tuple(_euler(solved.problem, run, euler) for euler in EULERS))
 
 
-def _euler(problem: Problem, exact: Trajectory, name: str) -> Trajectory:
+def _euler(problem: Problem, exact: Trajectory, euler: Integrator) -> Trajectory:
     """Run a method with the run's spacing; if it diverges, halve the duration until it can be solved."""
     count = len(exact.y) - 1
     while True:
         try:
-            return get_integrator(name).run(problem, exact.spacing_s, count)
+            return euler.run(problem, exact.spacing_s, count)
         except DynamicsError:
             if count < 2:
                 raise
