@@ -22,7 +22,6 @@ from springmass.loading.load import sample_data
 from springmass.page.web.security import ACT, Access
 from springmass.page.web.server import page_of, server_of, static_files
 from springmass.page.window.cards import Cards, NotTaken, checked
-from springmass.page.window.processes import prepare
 from springmass.page.window.recording import ports
 
 DESERTED_S, FIRST_S = 60.0, 600.0
@@ -45,7 +44,7 @@ ACTIONS: Mapping[str, Callable[[Cards, str, Mapping[str, Any]], Any]] = {
     "stop": lambda cards, card, _: cards.children.forget(card, "You stopped it"),
     "remove": lambda cards, card, _: cards.remove(card),
     "write": lambda cards, card, asked: cards.write(card, str(asked["what"])),
-    "judge": lambda cards, card, asked: cards.of_card(card, "judge", rows=checked("rows", asked["rows"])),
+    "judge": lambda cards, card, asked: cards.of_card(card, "judge", **checked({"rows": asked["rows"]})),
     "compare": lambda cards, _, asked: cards.compare(asked),
     "ports": lambda *_: ports(),
     "record": lambda cards, _, asked: cards.record(asked),
@@ -137,7 +136,7 @@ class Window:
 
     async def reading(self, over: Callable[[], None]) -> None:
         """Call ``over`` once no page has been there for a while and nothing is recorded."""
-        prepare()
+        self._cards.children.prepare()
         while True:
             await asyncio.sleep(1.0)
             busy = self._cards.look()
