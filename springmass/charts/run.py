@@ -1,4 +1,4 @@
-"""The charts of one run: position, amplitude, frequency, spectrum, drag, energy, motion, phase plot, classic method."""
+"""The charts of one run: motion, amplitude, frequency, spectrum, drag, energy, phase plot, contour, classic method."""
 
 from __future__ import annotations
 

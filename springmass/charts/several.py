@@ -1,4 +1,4 @@
-"""Charts of several runs: positions over one another, spring constants side by side, a course and its drag."""
+"""Charts of several runs: positions, spring constants, masses, Hooke's law, a course and the drag of its discs."""
 
 from __future__ import annotations
 

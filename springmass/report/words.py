@@ -1,4 +1,4 @@
-"""The result of a run in words: the summary, the damping law, the method."""
+"""Results in words: the summary, the damping law and the method of a run, and whether several runs agree."""
 
 from __future__ import annotations
 

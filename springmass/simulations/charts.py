@@ -1,4 +1,4 @@
-"""Charts of a simulation: forward and symplectic Euler as in the lab report, beside the exact solution."""
+"""Charts of a simulation: both Euler methods beside the exact motion, the band, and the run that is predicted."""
 
 from __future__ import annotations
 

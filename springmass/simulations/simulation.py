@@ -25,7 +25,7 @@ from pipeline.simulation.methods import DOP853
 from pipeline.track import F8
 from springmass.errors import LOG, ProgramError
 from springmass.result.run_json import picked, plain
-from springmass.simulations.against import Against, compare_with_run, duration_s
+from springmass.simulations.against import Against, against_json, compare_with_run, duration_s
 from springmass.simulations.from_run import SCENE_KEYS, scene_from_run
 from springmass.typeset import prefixed
 
@@ -153,7 +153,7 @@ def solve(
     return halved(problem, integrator, spacing_s, count, wanted, time.perf_counter)
 
 
-def band_of(ready: Prepared, seconds: float) -> tuple[Band | None, str]:
+def band_or_why(ready: Prepared, seconds: float) -> tuple[Band | None, str]:
     """Return the band from the uncertain inputs and how it was computed, or the reason why there is none."""
     if not ready.values():
         return None, "none: the scene states no uncertainties"
@@ -267,7 +267,7 @@ def simulated(scene: Scene, options: SimulationOptions, run: Run | None = None, 
     ready = prepare(scene, longest_s, analysis=analysis, where=where or "scene")
     if run is not None:
         LOG.info(f"from {run.loaded.path}: {', '.join(ready.from_run)}")
-    band, of_band = band_of(ready, longest_s)
+    band, of_band = band_or_why(ready, longest_s)
     tolerance = default_tolerance(band) if options.tolerance is None and method == "auto" else options.tolerance
     if not options.force:
         demand_stable(ready.problem, method, spacing_s if options.tolerance is None else None)
@@ -468,7 +468,7 @@ def _measured_growth(solved: Simulation, integrator: Integrator, period: int) ->
     return math.exp(grown) if math.isfinite(grown) and grown < 1.0 else None
 
 
-def summary(solved: Simulation) -> dict[str, Any]:
+def simulation_json(solved: Simulation) -> dict[str, Any]:
     """Return a simulation as the JSON of ``springmass simulate``."""
     solution, check, band = solved.solution, solved.check, solved.band
     content = {
@@ -492,14 +492,14 @@ def summary(solved: Simulation) -> dict[str, Any]:
         "prediction": prediction(solved),
         "equation": picked(solved.problem.equation, solved.problem.equation.__slots__),
         "effects": [picked(each, EFFECT_COLUMNS) for each in solved.effects],
-        "against": None if solved.against is None else solved.against.summary(),
-        "band": None if band is None else _band_summary(band, solved.trajectory.t),
+        "against": None if solved.against is None else against_json(solved.against),
+        "band": None if band is None else _band_json(band, solved.trajectory.t),
         "growth": [picked(each, GROWTH_COLUMNS) for each in solved.growths],
     }
     return {name: plain(value) for name, value in content.items()}
 
 
-def _band_summary(band: Band, t: F8) -> dict[str, Any]:
+def _band_json(band: Band, t: F8) -> dict[str, Any]:
     """Return the band as JSON; each half-width is the largest of the run."""
     around, (_, of_amplitude) = band.displacement_at(t), band.amplitude_at(t)
     widths = {
