@@ -65,9 +65,11 @@ class NeedsAnswer(FormatError):
         Number of the line that shows what is missing, counted from 1.
     """
 
+    between = " "
+
     def __init__(self, question: Question, remedy: str = "", *, line: int | None = None) -> None:
         super().__init__(question.path, question.sentence, remedy or question.remedy, line=line)
-        self.question, self.between = question, " "
+        self.question = question
 
     def with_remedy(self, remedy: str) -> NeedsAnswer:
         """Return an error with the same question and another remedy."""

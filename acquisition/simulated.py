@@ -21,7 +21,7 @@ from acquisition.block import Block, Flag, SourceInfo
 from acquisition.clock import Clock
 from acquisition.decoders.sensor import Sensor
 from acquisition.errors import SensorError
-from acquisition.readings import carried
+from acquisition.readings import Reading, carried
 
 FALSE_ECHO_M = 5e-3
 """Mean distance of the false echoes beyond the bob, m."""
@@ -55,21 +55,6 @@ class VirtualSensor:
                 raise SensorError(f"a simulated sensor's {name} must not be negative, got {getattr(self, name)}")
 
 
-@dataclass(frozen=True, slots=True)
-class Shot:
-    """One reading of the simulated sensor; echo time and distance are NaN for no target."""
-
-    true_s: float
-    """Time of the reading since the start."""
-    sequence: int
-    device_us: int
-    """Time by the sensor's clock, which wraps at 2^32."""
-    echo_us: float
-    """Time of flight, rounded to whole ticks."""
-    distance_m: float
-    """Distance that a sensor would calculate from the echo time."""
-
-
 class VirtualRangefinder:
     """Takes readings of a bob whose distance in m is a function of the time in s; ``rng`` gives all random numbers."""
 
@@ -80,20 +65,23 @@ class VirtualRangefinder:
         self._cluster_remaining = 0
         self._cluster_m = 0.0
 
-    def shot(self, sequence: int) -> Shot:
-        """Take the reading with a given sequence number; the numbers of successive calls must not decrease."""
+    def shot(self, sequence: int) -> Reading:
+        """Take the reading with a given sequence number; the numbers of successive calls must not decrease.
+
+        Its host time is that since the start; echo time and distance are NaN for no target.
+        """
         sensor = self.sensor
         true_s = sequence / sensor.rate_hz
         # The sound is reflected by the bob half the time of flight later.
         met_s = true_s + self._position(true_s) / sensor.speed_of_sound_m_per_s
         distance_m = self._position(met_s) + self._false_echo(true_s) + self._rng.normal(0.0, sensor.noise_m)
         flight_s = 2.0 * distance_m / sensor.speed_of_sound_m_per_s
-        device_us = round(sequence / sensor.rate_hz * 1e6) % (1 << 32)
+        # The device's clock wraps.
+        silent = Reading(round(true_s * 1e9), sequence, round(true_s * 1e6) % (1 << 32), temperature_c=TEMPERATURE_C)
         if flight_s < sensor.dead_time_s:
-            return Shot(true_s, sequence, device_us, math.nan, math.nan)
+            return silent
         echo_us = round(flight_s / sensor.tick_s) * sensor.tick_s * 1e6
-        distance = 0.5e-6 * echo_us * sensor.speed_of_sound_m_per_s
-        return Shot(true_s, sequence, device_us, echo_us, distance)
+        return silent._replace(echo_us=echo_us, distance_m=0.5e-6 * echo_us * sensor.speed_of_sound_m_per_s)
 
     def block(self, seconds: float) -> Block:
         """Return the readings of the first ``seconds``, for :class:`acquisition.replay.Replay`."""
@@ -101,7 +89,7 @@ class VirtualRangefinder:
         shots = [self.shot(sequence) for sequence in range(math.ceil(round(seconds * self.sensor.rate_hz, 6)))]
         distance = np.array([shot.distance_m for shot in shots], np.float64)
         flags = np.isnan(distance) * np.uint8(Flag.MISSING)
-        host_ns = np.array([round(shot.true_s * 1e9) for shot in shots], np.int64)
+        host_ns = np.array([shot.host_ns for shot in shots], np.int64)
         # The time of a sample is that of the reflection; without an echo, the last travel time is used.
         ways_s = np.array([0.5e-6 * shot.echo_us for shot in shots], np.float64)
         t = np.arange(len(shots)) / self.sensor.rate_hz + carried(ways_s, np.isfinite(ways_s), 0.0)
@@ -221,17 +209,12 @@ class VirtualPort:
     def _run(self) -> None:
         start_ns = self._clock.now_ns()
         for shot in map(self._rangefinder.shot, itertools.count()):
-            if shot.true_s >= self._seconds or self._stop.is_set():
+            content = shot._asdict()
+            since_ns = content.pop("host_ns")
+            if since_ns >= 1e9 * self._seconds or self._stop.is_set():
                 return
-            self._clock.sleep_until_ns(start_ns + round(shot.true_s * 1e9))
-            frame = self._encoder.encode(
-                sequence=shot.sequence,
-                device_us=shot.device_us,
-                echo_us=shot.echo_us,
-                distance_m=shot.distance_m,
-                temperature_c=TEMPERATURE_C,
-            )
-            self._send(frame)
+            self._clock.sleep_until_ns(start_ns + since_ns)
+            self._send(self._encoder.encode(**content))
 
     def _send(self, data: bytes) -> None:
         """Write all bytes; wait for a slow reader, with which a real sensor would lose bytes."""

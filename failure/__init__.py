@@ -14,8 +14,6 @@ class Error(ValueError):
         What to do.
     where : str, optional
         The place with the punctuation after it, where ``problem`` does not begin with it.
-    between : str, optional
-        The punctuation before the remedy.
 
     Examples
     --------
@@ -24,9 +22,12 @@ class Error(ValueError):
     ('run.csv: the rate is not stated; add rate_hz=100', 'add rate_hz=100')
     """
 
+    between = "; "
+    """The punctuation before the remedy."""
+
     # ``args`` are what ``__new__`` was given. So a copy, also in another process, is made of these and the attributes.
-    def __init__(self, problem: str, remedy: str = "", /, *, where: str = "", between: str = "; ") -> None:
-        self.problem, self.remedy, self.where, self.between = problem, remedy or problem, where, between
+    def __init__(self, problem: str, remedy: str = "", /, *, where: str = "") -> None:
+        self.problem, self.remedy, self.where = problem, remedy or problem, where
 
     def __str__(self) -> str:
         after = "" if self.remedy == self.problem else f"{self.between}{self.remedy}"

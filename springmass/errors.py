@@ -12,8 +12,6 @@
 ====  ================================================================
 """
 
-from __future__ import annotations
-
 import contextlib
 import logging
 import sys
@@ -38,10 +36,8 @@ def of_several(codes: Collection[int]) -> int:
 class ProgramError(Error):
     """An error for the user, with an exit code."""
 
-    def __init__(
-        self, problem: str, remedy: str = "", exit_code: int = USAGE, *, where: str = "", between: str = "; "
-    ) -> None:
-        super().__init__(problem, remedy, where=where, between=between)
+    def __init__(self, problem: str, remedy: str = "", exit_code: int = USAGE, *, where: str = "") -> None:
+        super().__init__(problem, remedy, where=where)
         self.exit_code = exit_code
 
 

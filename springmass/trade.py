@@ -4,8 +4,6 @@ Records are simulated from one motion, clean and spoilt in ways that benches kno
 The integrators solve the equation of the same motion.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Iterator
@@ -18,6 +16,7 @@ import numpy as np
 from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.damping.laws import LAWS, Law, find_law
 from pipeline.errors import DynamicsError, PipelineError
+from pipeline.numerics.least_squares import central_differences
 from pipeline.options import TIERS, options_for
 from pipeline.simulation import Equation, Problem, integrators
 from pipeline.simulation.halving import auto
@@ -148,11 +147,7 @@ def bounds(motion: TrueMotion, kind: RecordDefect) -> dict[str, float]:
     """
     t, theta = motion.t, motion.theta
     size, slopes = motion.law.curve(t, theta)
-    gradient = np.zeros(theta.size)
-    for i, value in enumerate(theta.tolist()):
-        step = np.zeros(theta.size)
-        step[i] = 1e-4 * (abs(value) or 1.0)
-        gradient[i] = (_rate(motion.law, theta + step) - _rate(motion.law, theta - step)) / (2.0 * step[i])
+    (gradient,) = central_differences(lambda at: np.array([_rate(motion.law, at)]), theta)
     variances = []
     for phase in np.linspace(-math.pi, math.pi, 9)[:-1]:
         angle = 2.0 * math.pi * motion.frequency_hz * t + phase

@@ -1,7 +1,5 @@
 """How numbers, units and the standing of a law are written: on a page, in a table and in LaTeX."""
 
-from __future__ import annotations
-
 import math
 import re
 import unicodedata

@@ -39,6 +39,8 @@ CLEARLY_BETTER = 10.0
 """Difference of -2 log likelihood above which the better model is very strongly supported (Kass and Raftery 1995)."""
 IMPOSSIBLE, OFF_BY_ONE = 12.0, 2.3
 """Minus the log likelihood of a line too many, and of one that came with the read before or after its own, 1 in 10."""
+NOMINAL = math.log(MOST_LOST / (math.sqrt(2.0 * math.pi) * 1e-6 * 30.0 * math.sqrt(2.0)))
+"""Log of the odds for two crystals at their nominal rates against any other rate that lost lines may hide."""
 MOST_PLACES = 8
 """Maximum number of lost lines in one read whose places are weighed."""
 U_LOCKED_PPM = 30.0 * math.sqrt(2.0 / 3.0)
@@ -233,7 +235,7 @@ class _Even(NamedTuple):
     def of(cls, reads: Reads, at: F8, gaps: F8) -> _Even | None:
         """Find the steps of lines that arrive with the reads ``at``, s."""
         counted = _all_arrived(reads, at)
-        steps, cost = (np.arange(gaps.shape[0]), 0.0) if counted else _with_losses(reads, at, gaps)
+        steps, cost, u_choice = (np.arange(gaps.shape[0]), 0.0, 0.0) if counted else _with_losses(reads, at, gaps)
         x = (steps - steps[0])[reads.last]
         step_s = float(at[-1] - at[0]) / float(x[-1] - x[0])
         fit = fit_clock(step_s * x, np.rint(at / NANO).astype(np.int64))
@@ -242,7 +244,7 @@ class _Even(NamedTuple):
         step_s, u_ppm = _unlocked(step_s / (1.0 + 1e-6 * fit.rate_error_ppm), fit.u_rate_error_ppm, at, x)
         lost = int(steps[-1] - steps[0]) + 1 - steps.size
         if lost and gaps.shape[0] > 2 * at.size:  # a wrong place moves the lines up to the next loss by a step
-            u_ppm = math.hypot(u_ppm, 1e6 * step_s / (math.sqrt(12.0) * float(at[-1] - at[0])))
+            u_ppm = math.hypot(u_ppm, u_choice, 1e6 * step_s / (math.sqrt(12.0) * float(at[-1] - at[0])))
         times = step_s * (steps - steps[0]) + _bend(at - step_s * x, x, steps - steps[0])
         late, early = at - times[reads.last], at[:-1] - times[reads.first[1:]]
         breaks = 0
@@ -269,18 +271,21 @@ def _all_arrived(reads: Reads, at: F8) -> bool:
     return bool(np.abs(minima - np.median(minima)).max() < 0.35 * slope)
 
 
-def _with_losses(reads: Reads, at: F8, gaps: F8) -> tuple[I8, float]:
-    """Return the steps of lines of which some were lost, and minus the log likelihood of the numbers of lines."""
+def _with_losses(reads: Reads, at: F8, gaps: F8) -> tuple[I8, float, float]:
+    """Return the steps of lines of which some were lost, minus the log likelihood of the numbers of lines, and u, ppm.
+
+    The uncertainty is that of the choice between a nominal rate and another.
+    """
     steps = np.empty(gaps.shape[0], np.int64)
-    grid, ways, cost = None, _ways(reads, gaps), 0.0
+    grid, ways, cost, u_ppm = None, _ways(reads, gaps), 0.0, 0.0
     for part in _segments(reads):
         grid = _Grid.of(at[part], reads.size[part], ways[part], grid)
-        cost += grid.cost
+        cost, u_ppm = cost + grid.cost, max(u_ppm, grid.u_ppm)
         rows = slice(int(reads.first[part][0]), int(reads.last[part][-1]) + 1)
         steps[rows] = _steps(grid, at[part], reads.size[part], gaps, rows.start)
         if rows.start:
             steps[rows] += max(0, int(steps[rows.start - 1] + 1 - steps[rows.start]))
-    return steps, cost
+    return steps, cost, u_ppm
 
 
 def _parts(at: F8) -> Iterator[slice]:
@@ -332,6 +337,15 @@ def _unlocked(step_s: float, u_ppm: float, at: F8, x: I8) -> tuple[float, float]
     return step_s, u_ppm
 
 
+def _nominal(at: F8, step_s: float) -> float:
+    """Return the whole number of milliseconds of the adapter's clock that a step of a board may be, s; 0 if none is."""
+    between_ms = 1e3 * np.diff(at)
+    whole = np.rint(between_ms)
+    if not whole.size or np.abs(between_ms - whole).mean() > 0.2:  # 0.25 by chance
+        return 0.0
+    return round(1e3 * step_s) * float(at[-1] - at[0]) / float(whole.sum())
+
+
 def _segments(reads: Reads) -> Iterator[slice]:
     """Yield the reads of consecutive segments."""
     for part in _parts(reads.at):
@@ -342,12 +356,16 @@ def _segments(reads: Reads) -> Iterator[slice]:
 
 
 class _Grid(NamedTuple):
-    """Slots ``start_s + k step_s`` in which lines may be sent, and the share of them whose line was lost."""
+    """Slots ``start_s + k step_s`` in which lines may be sent, and the share of them whose line was lost.
+
+    ``u_ppm`` is the standard deviation of the step if it may be the nominal one or another, each with its probability.
+    """
 
     start_s: float
     step_s: float
     share: float
     cost: float
+    u_ppm: float = 0.0
 
     @classmethod
     def of(cls, at: F8, size: I8, ways: F8, before: _Grid | None) -> _Grid:
@@ -376,7 +394,18 @@ class _Grid(NamedTuple):
             steps = np.outer(steps[best], 1.0 + np.arange(-2, 3) * 0.05 / lines[stop - 1]).ravel()
             starts = np.repeat(start[best], 5)[:, None] + np.linspace(-0.15, 0.15, 5) * steps[:, None]
         chosen = int(np.argmin(cost))
-        return cls(float(start[chosen]), float(steps[chosen]), float(share[chosen]), float(cost[chosen]))
+        likeliest = cls(float(start[chosen]), float(steps[chosen]), float(share[chosen]), float(cost[chosen]))
+        nominal = _nominal(at, likeliest.step_s)
+        if not nominal:
+            return likeliest
+        starts = at[0] - np.linspace(0.0, 1.0, 60, endpoint=False) * nominal
+        costs, shares = _cost(at, size, ways, starts[None], np.array([nominal]))
+        chosen = int(np.argmin(costs))
+        ahead = float(np.clip(likeliest.cost + NOMINAL - costs[0, chosen], -50.0, 50.0))
+        doubt = 1e6 * abs(likeliest.step_s / nominal - 1.0) * 0.5 / math.cosh(0.5 * ahead)
+        if ahead > 0.0:
+            likeliest = cls(float(starts[chosen]), nominal, float(shares[0, chosen]), float(costs[0, chosen]))
+        return likeliest._replace(u_ppm=doubt)
 
 
 def _cost(at: F8, size: I8, ways: F8, starts: F8, steps: F8) -> tuple[F8, F8]:

@@ -28,6 +28,9 @@ U_DENSITY = 2e-4  # equation: 22 ppm [1]_; carbon dioxide of a lecture room, 400
 U_VISCOSITY = 5e-3  # equation: 1 % at k = 2 [3]_; humidity, which it ignores: up to 0.3 %
 U_SOUND = 3e-4  # equation [2]_, including carbon dioxide
 
+# Standard uncertainty of an air temperature stated without one, K; the limit of error of a resistance thermometer of
+# class B is 0.4 K at 20 degrees (IEC 60751).
+U_STATED_TEMPERATURE_K = 0.5
 # Typical air of a laboratory, where the scene does not state it.
 TYPICAL_TEMPERATURE = Estimate(20.0, 3.0, "degC")
 TYPICAL_PRESSURE = Estimate(101325.0, 1500.0, "Pa")

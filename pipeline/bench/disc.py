@@ -13,7 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.bench.air import TYPICAL_HUMIDITY, TYPICAL_PRESSURE, TYPICAL_TEMPERATURE, air_density
+from pipeline.bench.air import (
+    TYPICAL_HUMIDITY,
+    TYPICAL_PRESSURE,
+    TYPICAL_TEMPERATURE,
+    U_STATED_TEMPERATURE_K,
+    air_density,
+)
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import oscillating_mass_kg
 from pipeline.errors import SceneError
@@ -39,8 +45,9 @@ def effective_mass_kg(scene: Scene) -> float:
 
 def scene_air(scene: Scene) -> tuple[Estimate, Estimate, Estimate]:
     """Return temperature, degC, pressure, Pa, and relative humidity of a scene's air, or typical values."""
+    celsius = scene.air_temperature_c or TYPICAL_TEMPERATURE
     return (
-        scene.air_temperature_c or TYPICAL_TEMPERATURE,
+        Estimate(celsius.value, celsius.u or U_STATED_TEMPERATURE_K, "degC"),
         scene.air_pressure_pa or TYPICAL_PRESSURE,
         scene.air_relative_humidity or TYPICAL_HUMIDITY,
     )

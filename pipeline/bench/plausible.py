@@ -28,7 +28,7 @@ USUAL: dict[str, tuple[float, float]] = {
 AIR_SHARE = 0.5
 # Bobs that a spring may weigh. It is chosen: ten times the heaviest laboratory spring, 50 g, on a bob of 0.1 kg.
 SPRING_BOBS = 5.0
-LONGEST_SAG_M = 10.0  # the longest range of a rangefinder (data sheet of the MaxBotix XL-MaxSonar)
+LONGEST_RANGE_M = 10.0  # of a rangefinder (data sheet of the MaxBotix XL-MaxSonar); no spring sags further
 # Ratio of two readings above which a slip would decide the results: by definition an inch is 2.54 cm, and other units
 # of a bench differ by 100 and more.
 DECIDING = 20.0
@@ -86,6 +86,6 @@ def _usual(scene: Scene, attribute: str) -> tuple[tuple[float, float], str]:
     if attribute == "spring_mass_kg" and bob is not None:
         return (0.0, SPRING_BOBS * bob.value), f"is a spring heavier than {SPRING_BOBS:g} bobs"
     if attribute == "spring_constant_n_per_m" and bob is not None:
-        softest = bob.value * GRAVITY_M_PER_S2 / LONGEST_SAG_M
-        return (softest, high), f"is a spring that the bob would stretch by more than {LONGEST_SAG_M:g} m"
+        softest = bob.value * GRAVITY_M_PER_S2 / LONGEST_RANGE_M
+        return (softest, high), f"is a spring that the bob would stretch by more than {LONGEST_RANGE_M:g} m"
     return (low, high), ""

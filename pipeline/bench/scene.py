@@ -89,32 +89,19 @@ class Stated(_Field[Estimate | float | str | tuple[float, float], Estimate]):
         return given if isinstance(given, Estimate) else Estimate(number, spread, self.unit)
 
 
-class Choice(_Field[str, str]):
-    """A text of a scene: its table and key in a scene file, and what returns the allowed texts."""
+class Choice(_Field[KeptT | str, KeptT]):
+    """A text of a scene, or true or false: its table and key in a scene file, and what returns the allowed ones."""
 
-    def __init__(self, table: str, key: str, texts: Callable[[], tuple[str, ...]]) -> None:
-        self.place, self.texts = (table, key), texts
+    def __init__(self, table: str, key: str, allowed: Callable[[], tuple[KeptT, ...]]) -> None:
+        self.place, self.allowed = (table, key), allowed
 
-    def checked(self, given: Any, where: str) -> str:
-        """Return a text if it is one of those allowed."""
-        if given not in (texts := self.texts()):
+    def checked(self, given: Any, where: str) -> KeptT:
+        """Return what is allowed; a command line gives true and false as a text."""
+        by_text = {str(each).lower(): each for each in self.allowed()}
+        if (text := str(given).lower()) not in by_text:
             table, key = self.place
-            raise SceneError(f"{where}: [{table}] {key} must be one of {', '.join(texts)}, got {_short(given)}")
-        return str(given)
-
-
-class TrueOrFalse(_Field[bool | str, bool]):
-    """A statement of a scene that is true or false: its table and key in a scene file."""
-
-    def __init__(self, table: str, key: str) -> None:
-        self.place = (table, key)
-
-    def checked(self, given: Any, where: str) -> bool:
-        """Return whether it is true; a command line gives it as a text."""
-        if (value := {"true": True, "false": False}.get(str(given).lower())) is None:
-            table, key = self.place
-            raise SceneError(f"{where}: [{table}] {key} must be true or false, got {_short(given)}")
-        return value
+            raise SceneError(f"{where}: [{table}] {key} must be one of {', '.join(by_text)}, got {_short(given)}")
+        return by_text[text]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,7 +117,7 @@ class Scene:
 
     bob_mass_kg: Stated = Stated("bob", "mass_kg", "kg", 1e-12, 1e6, "mass of the bob")
     spring_mass_kg: Stated = Stated("spring", "mass_kg", "kg", 0.0, 1e6, "mass of the spring")
-    spring_none: TrueOrFalse = TrueOrFalse("spring", "none")
+    spring_none: Choice[bool] = Choice("spring", "none", lambda: (True, False))
     spring_constant_n_per_m: Stated = Stated("spring", "constant_n_per_m", "N/m", 1e-12, 1e12, "spring constant")
     spring_cubic_n_per_m3: Stated = Stated("spring", "cubic_n_per_m3", "N/m3", -1e18, 1e18, "cubic term of the spring")
     pendulum_length_m: Stated = Stated("pendulum", "length_m", "m", 1e-4, 1e4, "length of the pendulum")
@@ -139,7 +126,7 @@ class Scene:
     air_pressure_pa: Stated = Stated("air", "pressure_pa", "Pa", 1e-3, 1e7, "air pressure")
     air_relative_humidity: Stated = Stated("air", "relative_humidity", "", 0.0, 1.0, "humidity of the air")
     sensor_sigma_m: Stated = Stated("sensor", "sigma_m", "m", 1e-12, 1e3, "noise of the sensor")
-    sensor_position: Choice = Choice("sensor", "position", lambda: POSITIONS)
+    sensor_position: Choice[str] = Choice("sensor", "position", lambda: POSITIONS)
     sensor_mean_samples: Stated = Stated("sensor", "mean_samples", "", 1.0, 1e4, "running mean of the sensor")
     sensor_lag_s: Stated = Stated("sensor", "lag_s", "s", 0.0, 1e3, "lag of the sensor")
     sensor_clock_ppm: Stated = Stated("sensor", "clock_ppm", "ppm", -1e5, 1e5, "error of the clock")
@@ -148,7 +135,7 @@ class Scene:
     gamma_per_s: Stated = Stated("damping", "gamma_per_s", "1/s", 0.0, 1e6, "linear damping")
     beta_per_m_s: Stated = Stated("damping", "beta_per_m_s", "1/(m s)", 0.0, 1e6, "quadratic damping")
     mu_m_per_s: Stated = Stated("damping", "mu_m_per_s", "m/s", 0.0, 1e6, "dry friction")
-    damping_law: Choice = Choice("damping", "law", law_names)
+    damping_law: Choice[str] = Choice("damping", "law", law_names)
 
     @classmethod
     def from_mapping(cls, tables: Mapping[str, Any], *, where: str = "scene") -> Scene:
@@ -209,7 +196,7 @@ class Scene:
 
 
 BENCH_KEYS = {each.place: each for each in vars(Scene).values() if isinstance(each, Stated)}
-_CHOICES = {each.place: each for each in vars(Scene).values() if isinstance(each, Choice | TrueOrFalse)}
+_CHOICES = {each.place: each for each in vars(Scene).values() if isinstance(each, Choice)}
 PLACES = {quantity.attribute: place for place, quantity in BENCH_KEYS.items()}
 """Table and key in a scene file for every quantity, by its attribute."""
 

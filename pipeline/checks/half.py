@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from pipeline.checks.residual import PARTS, Outcome, Residual
-from pipeline.checks.shape import HIGHEST
+from pipeline.checks.residual import Outcome, Residual
+from pipeline.checks.shape import HIGHEST, harmonics
 from pipeline.numerics.levels import IMPROBABLE, NEGLIGIBLE, SIGNIFICANT
-from pipeline.track import F8
+from pipeline.track import C16, F8
 
 # Harmonics of the motion that make pulses, with the line at twice its frequency; by chance each has the probability of
 # :data:`IMPROBABLE`.
@@ -34,15 +34,15 @@ def half_frequency(residual: Residual) -> Outcome | None:
     level, moves, u_moves = _mean_by_amplitude(residual)
     values = residual.values + residual.fitted.modes.independent(residual.samples.track.t[residual.rows])
     found: dict[str, float | None] = {}
-    if _locked(residual, values, 1):
-        sizes = [abs(_locked(residual, values, order)) for order in range(3, HIGHEST + 1)]
-        pulses = 1 + np.count_nonzero(sizes)
+    locked = _locked(residual, values)
+    if locked[1]:
+        pulses = 1 + np.count_nonzero(locked[3:])
         if any(abs(abs(moves) - x) < NEGLIGIBLE * x + SIGNIFICANT * u_moves < x for x in (RADIAL, HEIGHT)):
             found["moves"] = moves
-        elif pulses >= PULSES and math.hypot(*sizes) > NEGLIGIBLE * residual.amplitude:
+        elif pulses >= PULSES and np.linalg.norm(locked[3:]) > NEGLIGIBLE * residual.amplitude:
             found["pulses"] = float(pulses)
     elif any(abs(ratio - MAGNITUDE) < NEGLIGIBLE * MAGNITUDE for ratio in (level, moves)):
-        second = _locked(residual, values, 4) / residual.amplitude
+        second = complex(locked[4]) / residual.amplitude
         if abs(second - CUSPS) < 0.5 * abs(CUSPS):
             found["cusps"] = second.real
     if not found:
@@ -63,23 +63,17 @@ def _mean_by_amplitude(residual: Residual) -> tuple[float, float, float]:
     return float(offset.mean() / size.mean()), slope, u
 
 
-def _locked(residual: Residual, values: F8, order: int) -> complex:
-    """Return the mean amplitude of the harmonic of an order of half of the main frequency; 0 if it is not locked.
+def _locked(residual: Residual, values: F8) -> C16:
+    """Return the mean amplitudes of the harmonics of half of the main frequency by order; 0 if one is not locked.
 
-    As in :func:`pipeline.checks.shape.folded_shape`, the parts of the run must agree on it: the squared mean over its
-    variance from their scatter has the F distribution. A line beside half of the frequency turns from part to part.
+    As in :func:`pipeline.checks.shape.folded_shape`, the parts of the run must agree on it. A line beside half of the
+    frequency turns from part to part.
     """
-    if 0.5 * order * residual.turn > 0.5 * math.pi:
-        return 0.0
-    wave = np.exp(-0.5j * order * residual.phase)
-    size = np.ones(values.size) if residual.relative is None else residual.relative ** (0.5 * order)
-    starts = np.arange(PARTS) * values.size // PARTS
-    own = np.add.reduceat(size**2, starts)
-    each = 2.0 * np.add.reduceat(values * size * wave, starts) / np.maximum(own, 1e-300)
-    mean = complex(own @ each / own.sum())
-    known = float(own.sum() ** 2 / (own @ own))
-    scatter = float(own**2 @ np.abs(each - mean) ** 2) / float(own.sum() ** 2) * known / max(known - 1.0, 1e-9)
-    variance = max(scatter, 4.0 * residual.noise**2 / float(own.sum()), 1e-300)
-    if known <= 2.0 or (1.0 + abs(mean) ** 2 / variance / (known - 1.0)) ** (1.0 - known) > IMPROBABLE:
-        return 0.0
-    return mean * float(np.mean(size))
+    orders = np.arange(1, min(HIGHEST, int(math.pi / residual.turn)) + 1)
+    relative = None if residual.relative is None else np.sqrt(residual.relative)
+    mean, chance = harmonics(values, 0.5 * residual.phase, residual.noise, orders, relative)
+    if relative is not None:
+        mean *= [np.mean(relative**order) for order in orders.tolist()]
+    locked = np.zeros(HIGHEST + 1, np.complex128)
+    locked[orders] = np.where(chance < IMPROBABLE, mean, 0.0)
+    return locked

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,10 +14,57 @@ from pipeline.motion.fitted import Oscillation
 from pipeline.motion.kinds import Motion
 from pipeline.notice import Notice
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.halves import Difference, Points, difference
 from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_CURVE
-from pipeline.numerics.regression import Scatter
+from pipeline.numerics.regression import Scatter, beyond, decompose
 from pipeline.track import F8
+
+# Share of the information on a combination of parameters below which the other half does not determine it. It is above
+# the error of numerical derivatives in double precision, 4e-11 to 1e-7 (Press et al. (2007), section 5.7).
+UNDETERMINED = 1e-6
+
+
+class Difference(NamedTuple):
+    """The difference of the parameters of both halves: chi-square and the number of parameters."""
+
+    chi2: float
+    parameters: int
+
+    @property
+    def factor(self) -> float:
+        """The factor by which it exceeds that of the stated covariance; at least 1."""
+        return max(1.0, self.chi2 / self.parameters) if self.parameters else 1.0
+
+
+def difference(residual: F8, slopes: F8, correlation: float) -> Difference | None:
+    """Compare the parameters of both halves of equal information; None if one has too few points.
+
+    Residuals (n,) in the order of time, and derivatives (n, p) by the parameters, are in standard uncertainties.
+
+    The determinants of :math:`J^T J` are equal for both halves; their difference increases with the size of the first
+    one, so it is found by bisection. If all parameters may differ between the halves, chi-square falls by
+    :math:`d^T (C_1 + C_2)^{-1} d` for the difference d of the parameters and their covariances C: by the part of the
+    residual that lies in the derivatives of one half beyond those of the whole (G. C. Chow, Econometrica 28 (1960)
+    591), to first order for a law that is not linear.
+    """
+    first, last = FEWEST_FOR_CURVE, residual.size - FEWEST_FOR_CURVE
+    if last < first:
+        return None
+    scale = np.linalg.norm(slopes, axis=0)
+    slopes = slopes[:, scale > 0.0] / scale[scale > 0.0]
+    while first < last:
+        middle = (first + last) // 2
+        before, after = (np.linalg.slogdet(part.T @ part) for part in (slopes[:middle], slopes[middle:]))
+        first, last = (middle + 1, last) if before < after else (first, middle)
+    basis, _, _ = decompose(slopes)
+    one_half = slopes.copy()
+    one_half[:first] = 0.0
+    other = beyond(basis, one_half)
+    other = other[:, np.linalg.norm(other, axis=0) > UNDETERMINED]
+    if not other.size:
+        return None
+    apart, _, _ = decompose(other, UNDETERMINED)
+    part = apart.T @ beyond(basis, residual[:, None])[:, 0]
+    return Difference(float(part @ part) / correlation, part.size)
 
 
 def compare_halves(fitted: Motion) -> tuple[Motion, tuple[Notice, ...]]:
@@ -60,7 +108,7 @@ def _different(spread: Scatter | None, residual: F8, slopes: F8) -> Difference |
     if spread is None:
         return None
     kept, u = spread.kept, spread.u[spread.kept]
-    return difference(Points(residual[kept] / u, slopes[kept] / u[:, None], spread.correlation), FEWEST_FOR_CURVE)
+    return difference(residual[kept] / u, slopes[kept] / u[:, None], spread.correlation)
 
 
 def _of_law(fit: LawFit, damping: Damping, t: F8, amplitude: F8) -> Difference | None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.checks.residual import PARTS, Misfit, Outcome, Residual
 from pipeline.numerics.levels import IMPROBABLE, NEGLIGIBLE
-from pipeline.track import F8
+from pipeline.track import C16, F8
 
 # Highest order of the harmonics that are sought; each further one adds IMPROBABLE to the probability of a false alarm.
 HIGHEST = 8
@@ -39,16 +39,14 @@ def folded_shape(residual: Residual) -> Outcome | None:
     """
     if not residual.enough:
         return None
-    turns, relative = residual.phase * (1.0 / (2.0 * math.pi)), residual.relative
-    bins = ((turns - np.floor(turns)) * BINS).astype(np.int64)
-    np.minimum(bins, BINS - 1, out=bins)
+    values, phase, noise, relative = residual.values, residual.phase, residual.noise, residual.relative
     orders = np.arange(2, min(HIGHEST, int(math.pi / residual.turn) - 1) + 1)
     if not orders.size:
         return None
-    mean, chance = _folded(residual, bins, orders, None)
+    mean, chance = harmonics(values, phase, noise, orders, None)
     falls = False
     if relative is not None:
-        falling = _folded(residual, bins, orders, relative)
+        falling = harmonics(values, phase, noise, orders, relative)
         if falls := float(np.min(falling[1])) < float(np.min(chance)):
             mean, chance = falling
     stands = np.flatnonzero(chance < IMPROBABLE)
@@ -67,10 +65,17 @@ def folded_shape(residual: Residual) -> Outcome | None:
     sizes = {"damping_rate": 2.0 * moved / amplitude * fall / residual.seconds}
     misfit = Misfit("model_misfit", {"amplitude": moved, "offset": peak, "phase": share, **sizes})
     numbers = None if share < REPORTED else {"peak_m": peak, "share": share, **way}
+    bins = _bins(phase)
     explained = np.zeros(bins.size)
     for one, k in zip(each, order.tolist(), strict=True):
         explained += one[bins] if not falls or relative is None else one[bins] * relative**k
     return Outcome("not_sinusoidal", numbers, misfit, explained)
+
+
+def _bins(phase: F8) -> NDArray[np.int64]:
+    """Return the bin of each phase (n,)."""
+    turns = phase * (1.0 / (2.0 * math.pi))
+    return np.minimum(((turns - np.floor(turns)) * BINS).astype(np.int64), BINS - 1)
 
 
 def _way(power: F8, order: NDArray[np.int64], wave: F8) -> dict[str, float]:
@@ -84,24 +89,22 @@ def _way(power: F8, order: NDArray[np.int64], wave: F8) -> dict[str, float]:
     return {"near_peak_m" if abs(wave[BINS // 2]) > abs(wave[0]) else "far_peak_m": float(np.max(np.abs(wave)))}
 
 
-def _folded(
-    residual: Residual, bins: NDArray[np.int64], orders: NDArray[np.int64], relative: F8 | None
-) -> tuple[NDArray[np.complex128], F8]:
-    """Return harmonics (o,), m, steady or proportional to a power of the amplitude, and the chance of each.
+def harmonics(values: F8, phase: F8, noise: float, orders: NDArray[np.int64], relative: F8 | None) -> tuple[C16, F8]:
+    """Return harmonics of a phase (o,), steady or proportional to a power of the amplitude, and the chance of each.
 
     Each harmonic is the weighted mean of least-squares fits to the parts of the run.
     """
-    waves = np.exp(-1j * orders[:, None] * CENTRES)
+    waves, bins = np.exp(-1j * orders[:, None] * CENTRES), _bins(phase)
     each, own = np.zeros((PARTS, orders.size), np.complex128), np.zeros((PARTS, orders.size))
     edges = -(-np.arange(PARTS + 1) * bins.size // PARTS)
     for part, (first, stop) in enumerate(itertools.pairwise(edges.tolist())):
         rows = slice(first, stop)
-        weight = np.ones(stop - first) if relative is None else relative[rows]
+        weight = np.ones(stop - first) if relative is None else relative[rows] ** (orders[0] - 1)
         for i in range(orders.size):
-            if relative is not None:  # the first order is 2
+            if relative is not None:
                 weight = weight * relative[rows]
             if relative is not None or i == 0:
-                sums = np.bincount(bins[rows], residual.values[rows] * weight, BINS)
+                sums = np.bincount(bins[rows], values[rows] * weight, BINS)
             own[part, i] = weight @ weight
             each[part, i] = 2.0 * (waves[i] @ sums) / max(own[part, i], 1e-300)
     share = own / own.sum(axis=0)
@@ -109,7 +112,7 @@ def _folded(
     # Parts in which the harmonic is weak contain little information and have little weight.
     known = 1.0 / np.sum(share**2, axis=0)
     scatter = np.sum(share**2 * np.abs(each - mean) ** 2, axis=0) * known / np.maximum(known - 1.0, 1e-9)
-    variance = np.maximum(scatter, 4.0 * residual.noise**2 / own.sum(axis=0))
+    variance = np.maximum(scatter, 4.0 * noise**2 / own.sum(axis=0))
     judged = (known > 2.0) & (variance > 0.0)
     f = np.abs(mean) ** 2 / np.where(judged, variance, 1.0)
     chance = np.where(judged, (1.0 + f / np.where(judged, known - 1.0, 1.0)) ** (1.0 - known), 1.0)

@@ -11,6 +11,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from pipeline.bench.disc import effective_mass_kg
 from pipeline.bench.scene import Scene
 from pipeline.errors import DynamicsError, SceneError
@@ -67,6 +69,11 @@ class Equation:
         """Return the spring's pull per mass at displacement y, m/s^2, positive towards positive y."""
         pull = self.angular_frequency_per_s**2 * y
         return pull + self.cubic_per_m2_s2 * y * y * y if self.cubic_per_m2_s2 else pull
+
+    def acceleration(self, y: Real, v: Real) -> Real:
+        """Return the acceleration, m/s^2, of a moving bob at displacement y and velocity v."""
+        force = self.spring(y) + (2.0 * self.gamma_per_s + self.drag_per_m * abs(v)) * v
+        return -force - self.friction_m_per_s2 * np.sign(v) if self.friction_m_per_s2 else -force
 
     def direction(self, y: float, v: float) -> int:
         """Return the direction in which a bob moves or starts from rest: 1, -1, or 0 if friction holds it."""

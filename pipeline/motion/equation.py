@@ -20,7 +20,7 @@ from numpy.polynomial import Legendre
 from pipeline.damping.law_fit import least_chi2, mean_squared_rate, weigh
 from pipeline.damping.laws.drag import COEFFICIENTS, DRAGS, Drag
 from pipeline.damping.select import Damping, select_law
-from pipeline.dynamics.equation import Equation, Problem, Real
+from pipeline.dynamics.equation import Equation, Problem
 from pipeline.dynamics.integrator import Trajectory
 from pipeline.dynamics.strang import STRANG
 from pipeline.modes.mode import Modes
@@ -127,7 +127,7 @@ class FreeMotion:
             sized -= (1 - power) * theta[slot] * columns[slot]
             timed -= theta[slot] * columns[slot]
         _, y0, v0, omega = theta[: len(STATE)].tolist()
-        a0 = self._acceleration(path.problem.equation, y0, v0)
+        a0 = path.problem.equation.acceleration(y0, v0)
         determinant = y0 * a0 - v0 * v0
         columns[0] = np.ones(t.size)
         columns[1] = (a0 * sized - v0 * speed) / determinant
@@ -140,14 +140,9 @@ class FreeMotion:
         return self._velocity(self.trajectory(theta), t)
 
     def _velocity(self, path: Trajectory, t: F8) -> F8:
-        pull = self._acceleration(path.problem.equation, path.y, path.v)
+        pull = path.problem.equation.acceleration(path.y, path.v)
         # A state with zero velocity is taken as held by friction; turning points lie between two states of the path.
         return Trajectory(path.problem, path.spacing_s, path.v, np.where(path.v == 0.0, 0.0, pull)).at(t)
-
-    @staticmethod
-    def _acceleration(equation: Equation, y: Real, v: Real) -> Real:
-        drag = (2.0 * equation.gamma_per_s + equation.drag_per_m * np.abs(v)) * v
-        return -equation.spring(y) - drag - equation.friction_m_per_s2 * np.sign(v)
 
     def trajectory(self, theta: F8) -> Trajectory:
         """Return the solution about the rest position."""

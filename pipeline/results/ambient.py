@@ -21,11 +21,10 @@ class Ambient:
     temperature, so results include their correlation.
     """
 
-    def __init__(self, scene: Scene, inputs: Inputs, *, u_temperature_k: float) -> None:
+    def __init__(self, scene: Scene, inputs: Inputs) -> None:
         celsius, pressure, humidity = scene_air(scene)
         self._sensor = scene.tells_of_sensor
         self.known = scene.air_temperature_c is not None
-        celsius = Estimate(celsius.value, celsius.u or u_temperature_k, "degC")
         self._inputs = inputs
         self._temperature = inputs.add("air_temperature", celsius, "B")
         self._pressure = inputs.add("air_pressure", pressure, "B")

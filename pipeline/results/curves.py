@@ -18,6 +18,7 @@ from pipeline.damping.average import Weighted
 from pipeline.damping.law_fit import LawFit
 from pipeline.damping.laws.drag import COEFFICIENTS
 from pipeline.damping.select import Damping
+from pipeline.dynamics.equation import Equation
 from pipeline.motion.fitted import Oscillation, Phase
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.levels import FEWEST_FOR_LINE, MISFIT
@@ -208,5 +209,5 @@ def _by_equation(fitted: Oscillation, x: F8, v: F8) -> F8:
     found, phase = fitted.damping.best.joint.estimates(), fitted.phase
     mu, gamma, beta = (found[name].value if name in found else 0.0 for name in COEFFICIENTS)
     natural = math.sqrt(phase.angular_frequency.value**2 + (phase.squared_rate or 0.0))
-    drag = (2.0 * gamma + 0.75 * math.pi * beta / natural * np.abs(v)) * v + 0.5 * math.pi * natural * mu * np.sign(v)
-    return np.where(v == 0.0, 0.0, -(natural**2) * x - drag)
+    equation = Equation.from_laws(natural, gamma_per_s=gamma, beta_per_m_s=beta, mu_m_per_s=mu)
+    return np.where(v == 0.0, 0.0, equation.acceleration(x, v))

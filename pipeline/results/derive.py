@@ -39,10 +39,6 @@ from pipeline.results.formulas import solve
 from pipeline.track import F8, UNUSABLE, Quality, Track
 from pipeline.windows.demodulate import Windows
 
-# Standard uncertainty of an air temperature stated without one, K; the limit of error of a resistance thermometer of
-# class B is 0.4 K at 20 degrees (IEC 60751).
-U_AIR_TEMPERATURE_K = 0.5
-
 
 @dataclass(frozen=True, eq=False)
 class Derived:
@@ -251,7 +247,7 @@ def _of_motion(
 
 def _of_scene(track: Track, scene: Scene, included: set[str], inputs: Inputs) -> dict[str, Any]:
     """Return the inputs of the formulas that the scene gives; None for what it does not state."""
-    air = Ambient(scene, inputs, u_temperature_k=U_AIR_TEMPERATURE_K)
+    air = Ambient(scene, inputs)
 
     def stated(name: str, value: Estimate | None) -> Any:
         return None if value is None else inputs.add(name, value, "B")

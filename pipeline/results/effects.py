@@ -92,14 +92,14 @@ def simulated_effects(scene: Scene, problem: Problem, seconds: float, drag: Deri
     softer = f"the air's u of {u_kelvin:g} K makes a steel spring softer by {SOFTER_PER_K * u_kelvin:.1g}"
     swings = (
         f"the scene gives no length; suspended {length:.3g} m +- {1.5 * start:.2g} m below its point the bob would "
-        f"swing sideways at half the frequency (2:1), growing by {0.375 * omega * start / length:.2g} 1/s"
+        "swing sideways at half the frequency (2:1), and a small swing would grow at this rate"
     )
     return (
         *_masses(scene, moved),
         _disc(scene, problem, seconds, drag),
         *_forces(problem, seconds),
         Effect("temperature", turned(SOFTER_PER_K * u_kelvin), None, "1", False, softer),
-        Effect("sideways_mode", None, None, "1", False, swings),
+        Effect("sideways_mode", 0.375 * omega * start / length, None, "1/s", False, swings),
         _buoyancy(scene, omega, start, "1"),
     )
 

@@ -132,14 +132,7 @@ def acceleration(eq: Equation) -> Callable[[float, float], float]:
     callable
         Takes y in m and v in m/s.
     """
-    stiffness, cubic, friction = eq.angular_frequency_per_s**2, eq.cubic_per_m2_s2, eq.friction_m_per_s2
-    viscous, drag = 2.0 * eq.gamma_per_s, eq.drag_per_m
-
-    def of(y: float, v: float) -> float:
-        rub = friction if v > 0 else -friction if v < 0 else 0.0
-        return -(stiffness + cubic * y * y) * y - (viscous + drag * abs(v)) * v - rub
-
-    return of
+    return eq.acceleration
 
 
 def _forward_euler_limit(omega: float, gamma: float) -> float:

@@ -1,7 +1,5 @@
 """Word the answer to a reader's question as a Python call."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from acquisition.recordings.questions import Question
@@ -9,7 +7,7 @@ from acquisition.recordings.questions import Question
 
 def as_arguments(answers: Mapping[str, object]) -> str:
     """Return keyword arguments of :func:`springmass.load` as Python source text."""
-    return ", ".join(f"{name}={_literal(value)}" for name, value in answers.items() if is_given(value))
+    return ", ".join(f"{name}={_literal(value)}" for name, value in answers.items())
 
 
 def for_python(question: Question, function: str, given: Mapping[str, object]) -> str:
@@ -17,11 +15,6 @@ def for_python(question: Question, function: str, given: Mapping[str, object]) -
     kept = {name: value for name, value in given.items() if name not in question.missing}
     words = (_literal(question.path), as_arguments(kept), as_arguments(question.examples))
     return f"{function}({', '.join(filter(None, words))})"
-
-
-def is_given(value: object) -> bool:
-    """Return whether a keyword argument says anything."""
-    return value is not None and value is not False
 
 
 def _literal(value: object) -> str:

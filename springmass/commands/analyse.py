@@ -40,6 +40,7 @@ from springmass.result.output_names import distinct_names, make_folder, results_
 from springmass.result.run_json import rejected
 from springmass.runs.run import Run
 from springmass.runs.tasks import Failed, Task, analyse_all, law_lines
+from springmass.terminal.progress import counted, counted_figures
 from storage.errors import WriteFailed
 
 TOGETHER = "together.results"
@@ -87,16 +88,15 @@ def analyse(
     given: GivenOptions,
 ) -> int:
     """Analyse every input; if one fails, the others still give results."""
-    inputs = [str(each) for each in recordings]
     own = {name: getattr(options, name) for name in ("from_s", "to_s", "clock_ppm", "method")}
     how = analysis.of(read, **own)
-    if options.keep and (not read.about_the_file().given() or STDIN in inputs):
+    if options.keep and (not read.about_the_file().given() or STDIN in recordings):
         raise ProgramError("--keep keeps options of reading such as --unit next to a file", "give one, and the file")
-    if how.velocity is not None and (len(inputs) > 1 or Path(inputs[0]).is_dir()):
-        got = f"{len(inputs)} inputs" if len(inputs) > 1 else "a folder"
+    if how.velocity is not None and (len(recordings) > 1 or Path(recordings[0]).is_dir()):
+        got = f"{len(recordings)} inputs" if len(recordings) > 1 else "a folder"
         raise ProgramError(f"--velocity completes one position file, got {got}", "analyse the pair by itself")
-    scenes, values = read_scenes(options.scene, len(inputs)), bench.values()
-    files, folders = files_of(inputs)
+    scenes, values = read_scenes(options.scene, len(recordings)), bench.values()
+    files, folders = files_of(recordings)
     for line in folders:
         LOG.info(line)
     alone = len(files) == 1
@@ -113,47 +113,35 @@ def analyse(
         given.refuse("on JSON", "--full", "--si")
     if not alone:
         given.refuse("on several inputs", "--template", "--full")
-        return _several(tasks, inputs, options, out, read)
-    (run,) = analyse_all(tasks)
-    if isinstance(run, Failed):
-        if run.question is not None and inputs == [files[0].path]:
-            raise run.question  # the caller answers it with the typed command line
-        return _failed(run)
-    if options.json:
-        print(json.dumps(run.result, allow_nan=False), flush=True)
-    else:
-        _print_text(run, options)
-    name = results_name(run.loaded.path, run=how.run, channel=how.channel)
-    written = OK if out is None else _write(out / name, [run], options)
-    _keep([run], read, options)
-    return max(_judged(run, options), written)
-
-
-def _several(
-    tasks: Sequence[Task], inputs: Sequence[str], options: AnalyseOptions, out: Path | None, read: LoadOptions
-) -> int:
-    """Analyse many inputs: one Table 1 and one report."""
-    from springmass.terminal.progress import counted
-
-    runs: list[Run] = []
-    codes: list[int] = []
-    for run in counted(analyse_all(tasks), len(tasks), "runs"):
-        if isinstance(run, Failed):
-            codes.append(_failed(run))
-            continue
-        if options.json:
-            print(json.dumps(run.result, allow_nan=False), flush=True)
-        codes.append(_judged(run, options))
-        runs.append(run)
+    runs, codes = _analysed(tasks, options, typed=recordings == (files[0].path,))
     if runs and not options.json:
-        _print_together(runs, options)
-    written = _write(out / TOGETHER, runs, options) if runs and out is not None else OK
+        _print_text(runs[0], options) if alone else _print_together(runs, options)
+    written = OK
+    if runs and out is not None:
+        name = results_name(runs[0].loaded.path, run=how.run, channel=how.channel) if alone else TOGETHER
+        written = _write(out / name, runs, options)
     _keep(runs, read, options)
+    codes += [_judged(run, options) for run in runs]
     if len(runs) > 1:
-        named = shlex.join(inputs)
+        named = shlex.join(recordings)
         LOG.log(HINT, f"springmass compare {named if len(named) <= LONGEST_INPUTS else '...'}")
     code = of_several(codes)
     return code if code == SOME_FAILED else max(code, written)
+
+
+def _analysed(tasks: Sequence[Task], options: AnalyseOptions, *, typed: bool) -> tuple[list[Run], list[int]]:
+    """Return the runs, printed as JSON if that is wanted, and the exit codes of inputs that give none."""
+    runs, codes = list[Run](), list[int]()
+    for outcome in counted(analyse_all(tasks), len(tasks), "runs"):
+        if isinstance(outcome, Run):
+            runs.append(outcome)
+            if options.json:
+                print(json.dumps(outcome.result, allow_nan=False), flush=True)
+        elif outcome.question is not None and typed:
+            raise outcome.question  # the caller answers it with the typed command line
+        else:
+            codes.append(_failed(outcome))
+    return runs, codes
 
 
 def _keep(runs: Sequence[Run], read: LoadOptions, options: AnalyseOptions) -> None:
@@ -221,7 +209,6 @@ def _print_together(runs: Sequence[Run], options: AnalyseOptions) -> None:
 def _write(folder: Path, runs: Sequence[Run], options: AnalyseOptions) -> int:
     """Write the report, and return an exit code: a folder that takes none costs one line, and not the result."""
     from springmass.report.write import write_report
-    from springmass.terminal.progress import counted_figures
 
     template = options.template if len(runs) == 1 else None
     try:

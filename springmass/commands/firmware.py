@@ -1,13 +1,8 @@
 """``springmass firmware``: wiring and settings of the rangefinder that this project builds, and how to flash it."""
 
-from __future__ import annotations
-
 import contextlib
 import shlex
-from collections.abc import Sequence
-from typing import Annotated, Any
-
-from cyclopts import Parameter, Token
+from typing import Annotated
 
 from acquisition.clock import SystemClock
 from acquisition.decoders.decoder import Identity
@@ -15,6 +10,7 @@ from acquisition.decoders.line_protocol import FAMILY, LineProtocolDecoder
 from acquisition.errors import visible
 from acquisition.live.firmware import BOOTLOADER_BAUDS, FIRMWARE_VERSION, HEX, WIRING, avrdude_arguments
 from acquisition.live.serial_port import SerialPort
+from springmass.commands.options import converted
 from springmass.commands.parameters import Whole, option
 from springmass.errors import HINT, LOG, OK, SENSOR, ProgramError
 from springmass.session.sensors import outdated, settings_of
@@ -24,29 +20,21 @@ ANSWER_S = 5.0
 ASK_EVERY_S = 0.5
 
 
-def _gate(_: Any, tokens: Sequence[Token]) -> tuple[int, int]:
-    near, comma, far = tokens[0].value.partition(",")
+def _gate(text: str) -> tuple[int, int]:
+    near, comma, far = text.partition(",")
     if not (comma and near.isdecimal() and far.isdecimal()):
         raise ValueError("must be NEAR,FAR in whole us")
     return int(near), int(far)
-
-
-Gate = Annotated[
-    tuple[int, int] | None,
-    Parameter(
-        metavar="NEAR,FAR",
-        help="range of accepted times of flight, us; NEAR is at least 116",
-        converter=_gate,
-        n_tokens=1,
-    ),
-]
 
 
 def firmware(
     *,
     port: Annotated[str | None, option("P", "port of the board")] = None,
     rate: Annotated[Whole | None, option("R", "pings per second, 10 to 125; the board stores the setting")] = None,
-    gate: Gate = None,
+    gate: Annotated[
+        tuple[int, int] | None,
+        converted("NEAR,FAR", "range of accepted times of flight, us; NEAR is at least 116", _gate, repeated=False),
+    ] = None,
     spread: Annotated[Whole | None, option("US", "largest random delay of a ping, 0 to 2000 us")] = None,
     name: Annotated[str | None, option("NAME", "name of the board: at most 12 letters, digits, . _ or -")] = None,
 ) -> int:
@@ -86,16 +74,13 @@ def _converse(address: str, commands: list[str]) -> Identity:
             refused = decoder.faults["refused_command"]
             decoder.status.identity = None
             port.write(f"{command}\n".encode("ascii", "replace"))
-            while decoder.status.identity is None and decoder.faults["refused_command"] == refused:
+            while decoder.status.identity is None:
                 if clock.now_ns() > end_ns:
                     raise ProgramError(f"{address}: no answer to {command!r}", "try again", SENSOR)
                 decoder.feed(0, _heard(port, clock))
-            if decoder.faults["refused_command"] > refused:
-                raise ProgramError(
-                    f"{address}: the device does not take {command!r}",
-                    "docs/reference/line-protocol.md has the ranges",
-                    SENSOR,
-                )
+                if decoder.faults["refused_command"] > refused:
+                    wrong = f"{address}: the device does not take {command!r}"
+                    raise ProgramError(wrong, "docs/reference/line-protocol.md has the ranges", SENSOR)
         assert decoder.status.identity is not None
         return decoder.status.identity
 
@@ -107,7 +92,7 @@ def _ask(port: SerialPort, decoder: LineProtocolDecoder, clock: SystemClock, end
         if clock.now_ns() > end_ns:
             what = "readings, but not what it is" if heard else "nothing"
             wrong = f"{port.name}: the device was asked what it is and said {what}"
-            raise ProgramError(f"{wrong}", "is it the right port? `springmass firmware` shows how to flash it", SENSOR)
+            raise ProgramError(wrong, "is it the right port? `springmass firmware` shows how to flash it", SENSOR)
         port.write(FAMILY.identify)
         until_ns = clock.now_ns() + int(ASK_EVERY_S * 1e9)
         while decoder.status.identity is None and clock.now_ns() < until_ns:

@@ -18,19 +18,21 @@ from springmass.loading.options import LOAD_FIELDS, Accuracy, AnalysisOptions, L
 if TYPE_CHECKING:
     from pipeline.numerics.estimate import Estimate
 
-FileArgument = str | Path
-"""The name of a file; a shell completes it."""
+    FileArgument = str
+else:
+    FileArgument = str | Path  # as it is typed; a shell completes the name of a file where a path is allowed
+
 HOW_READ = Group("How the recording is read", sort_key=2)
 THE_PAGE = Group("The page", sort_key=4)
 FURTHER_OPTIONS = Parameter(group=Group("Further options", sort_key=4))
 """Marks an option that few people use, which the help shows below the others."""
 
 
-def converted(metavar: str, words: str, convert: Callable[[str], Any]) -> Parameter:
-    """Return the declaration of an option that may be repeated, with a function that converts each of its values."""
+def converted(metavar: str, words: str, convert: Callable[[str], Any], *, repeated: bool = True) -> Parameter:
+    """Return the declaration of an option, with a function that converts its value or, if ``repeated``, its values."""
 
-    def every(_: Any, tokens: Sequence[Token]) -> tuple[Any, ...]:
-        return tuple(convert(token.value) for token in tokens)
+    def every(_: Any, tokens: Sequence[Token]) -> Any:
+        return tuple(convert(token.value) for token in tokens) if repeated else convert(tokens[0].value)
 
     return Parameter(metavar=metavar, help=words, converter=every, accepts_keys=False, n_tokens=1)
 
@@ -42,8 +44,8 @@ def _decoder_option(text: str) -> tuple[str, Any]:
     return name, int(value) if value.isdecimal() else value
 
 
-def _formats(_: Any, tokens: Sequence[Token]) -> tuple[str, ...]:
-    kinds = tuple(kind.strip().lower() for kind in tokens[0].value.split(","))
+def _formats(text: str) -> tuple[str, ...]:
+    kinds = tuple(kind.strip().lower() for kind in text.split(","))
     if not set(kinds) <= {"svg", "pdf", "png"}:
         raise ValueError("must be svg, pdf or png, or several of them with commas")
     return kinds
@@ -55,12 +57,11 @@ Scenes = Annotated[
 ]
 FiguresOption = Annotated[
     tuple[Literal["svg", "pdf", "png"], ...],
-    Parameter(
-        name="--figures",
-        metavar="FORMATS",
-        help="also write each chart into figures/, as svg, pdf or png (or several: svg,pdf)",
-        converter=_formats,
-        n_tokens=1,
+    converted(
+        "FORMATS",
+        "also write each chart into figures/, as svg, pdf or png (or several: svg,pdf)",
+        _formats,
+        repeated=False,
     ),
 ]
 Json = Annotated[bool, Parameter(name="--json", help="print JSON on standard output")]
@@ -71,10 +72,10 @@ Overwrite = Annotated[bool, flag("replace an existing output")]
 Strict = Annotated[bool, flag("exit with code 5 if a finding is an error")]
 
 
-def _mass(_: Any, tokens: Sequence[Token]) -> Estimate:
+def _mass(text: str) -> Estimate:
     from pipeline.bench.typed import typed
 
-    return typed(tokens[0].value, "kg")
+    return typed(text, "kg")
 
 
 def _setting(text: str) -> tuple[tuple[str, str], Any]:
@@ -96,13 +97,7 @@ class BenchOptions:
     """Values of the bench, each with its standard uncertainty."""
 
     mass_kg: Annotated[
-        Any,
-        Parameter(
-            metavar="M",
-            help="all that hangs on the spring, kg: 0.2007+/-0.0001, '200.7 g'",
-            converter=_mass,
-            n_tokens=1,
-        ),
+        Any, converted("M", "all that hangs on the spring, kg: 0.2007+/-0.0001, '200.7 g'", _mass, repeated=False)
     ] = None
     set: Annotated[
         tuple[tuple[tuple[str, str], Any], ...],

@@ -1,7 +1,5 @@
 """Word the answer to a reader's question as options of the command line, quoted for a shell."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections.abc import Mapping, Sequence
@@ -10,7 +8,6 @@ from cyclopts.argument import Argument
 
 from acquisition.errors import NeedsAnswer
 from acquisition.recordings.questions import Question
-from springmass.api.questions import is_given
 from springmass.terminal.printing import option_of
 
 
@@ -31,7 +28,7 @@ def option_words(answers: Mapping[str, object]) -> list[str]:
     for name, value in answers.items():
         if value is True:
             words.append(option_of(name))
-        elif is_given(value):
+        elif value is not None and value is not False:
             text = f"{value:.15g}" if isinstance(value, float) else str(value)
             # A value may begin with a minus sign only if it is joined to its option by an equals sign.
             words += [f"{option_of(name)}={text}"] if text.startswith("-") else [option_of(name), text]
@@ -51,30 +48,32 @@ def for_command(question: Question, words: Sequence[str]) -> str:
     """
     end = words.index("--") if "--" in words else len(words)
     declared = _arguments_of(next((word for word in words[1:] if not word.startswith("-")), ""))
-    if "--read" not in {name for each in declared for name in each.names}:
-        answered, kept = {option_of(name) for name in question.missing}, list[str]()
-        for before, word in zip(("", *words), words[:end], strict=False):
-            if before not in answered and word.partition("=")[0] not in answered:
-                kept.append(word)
-        return " ".join(map(quoted, [*kept, *option_words(question.examples), *words[end:]]))
-    if any(each.field_info.kind is each.field_info.VAR_POSITIONAL for each in declared):
-        path = f"./{question.path}" if question.path.startswith("-") else question.path
-        return " ".join(map(quoted, ["springmass", "scene", path, *option_words(question.examples)]))
-    line, others, missing = list[str](), iter(words[:end]), set(question.missing)
+    in_pairs = any("--read" in each.names for each in declared)
+    if in_pairs and any(each.field_info.kind is each.field_info.VAR_POSITIONAL for each in declared):
+        return _line_of("scene", question.path, question.examples)
+    kept, others, answered = list[str](), iter(words[:end]), {option_of(name) for name in question.missing}
     for word in others:
-        name, _, value = word.partition("=")
-        pair = [word] if name == "--read" and value else [word, next(others, "")] if word == "--read" else []
-        if not pair:
-            line.append(word)
-        elif pair[-1].removeprefix("--read=").partition("=")[0].replace("-", "_") not in missing:
-            line += pair
-    return " ".join(map(quoted, [*line, *pair_words(question.examples), *words[end:]]))
+        name, equals, value = word.partition("=")
+        if name not in answered and name != "--read":
+            kept.append(word)
+            continue
+        value = value if equals else next(others, "")
+        if name == "--read" and option_of(value.partition("=")[0]) not in answered:
+            kept += [name, value]
+    answers = pair_words(question.examples) if in_pairs else option_words(question.examples)
+    return " ".join(map(quoted, [*kept, *answers, *words[end:]]))
 
 
 def for_one(error: NeedsAnswer, command: str, path: str, answers: Mapping[str, object]) -> NeedsAnswer:
     """Return the question about one of several inputs, with a command line for this input alone."""
+    others = {name: value for name, value in answers.items() if name not in error.question.missing}
+    return error.with_remedy(_line_of(command, path, others | error.question.examples))
+
+
+def _line_of(command: str, path: str, answers: Mapping[str, object]) -> str:
+    """Return a command line for one file."""
     path = f"./{path}" if path.startswith("-") else path
-    return error.with_remedy(for_command(error.question, ["springmass", command, path, *option_words(answers)]))
+    return " ".join(map(quoted, ["springmass", command, path, *option_words(answers)]))
 
 
 def _arguments_of(command: str) -> list[Argument]:

@@ -1,25 +1,20 @@
 """``springmass replay``: a recording through the interface of a live sensor, on standard output."""
 
-from __future__ import annotations
-
 import math
 import sys
-from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
-from cyclopts import Parameter, Token
 
 from acquisition.clock import SystemClock, VirtualClock
 from acquisition.replay import Replay
-from springmass.commands.options import ReadPairs, RecordingArgument
+from springmass.commands.options import ReadPairs, RecordingArgument, converted
 from springmass.commands.parameters import Finite, flag, option
 from springmass.errors import OK
 from springmass.loading.load import load
 
 
-def _speed(_: Any, tokens: Sequence[Token]) -> float:
-    text = tokens[0].value
+def _speed(text: str) -> float:
     try:
         speed = float("inf") if text == "max" else float(text)
     except ValueError:
@@ -34,7 +29,7 @@ def replay(
     /,
     *,
     speed: Annotated[
-        float, Parameter(metavar="X", help="speed, in multiples of real time, or max (default: 1)", converter=_speed)
+        float, converted("X", "speed, in multiples of real time, or max (default: 1)", _speed, repeated=False)
     ] = 1.0,
     seek: Annotated[Finite | None, option("S", "start at this second of the recording")] = None,
     loop: Annotated[bool, flag("start again at the end, until Ctrl-C")] = False,

@@ -1,7 +1,5 @@
 """``springmass scene``: a scene to fill in, a scene checked, and what is noted beside a recording afterwards."""
 
-from __future__ import annotations
-
 import shlex
 from pathlib import Path
 from typing import Annotated
@@ -12,43 +10,6 @@ from springmass.commands.parameters import argument, option
 from springmass.errors import HINT, LOG, OK, UNREADABLE, ProgramError, of_several
 from springmass.loading.inputs import files_of
 from springmass.loading.options import LoadOptions
-
-SCENE_TEMPLATE = """\
-# What was at the bench. Remove the # before what you measured, and put your numbers for the dots.
-# { value = ..., u = ... } states a standard uncertainty; a plain number counts as exact. What is not known is not used.
-
-[bob]
-# mass_kg = { value = ..., u = ... }        # kg, such as 0.2007 and 0.0001: all that hangs on the spring, disc included
-
-[spring]
-# mass_kg = { value = ..., u = ... }        # kg, such as 0.0104 and 0.0001: a third of it swings along
-# constant_n_per_m = ...                    # for springmass simulate; an analysis measures it
-# none = true                               # no spring bears the bob: a torsion balance, a light spot, a beam
-
-[pendulum]
-# length_m = { value = ..., u = ... }       # m, from the pivot to the middle of the bob: its angle gives g
-
-[disc]
-# diameter_m = { value = ..., u = ... }     # m, such as 0.102 and 0.0005
-
-[air]
-# temperature_c = { value = ..., u = ... }  # degrees C: it sets the speed of sound, the scale of a rangefinder
-# pressure_pa = ...                         # 101325 if it is not stated
-# relative_humidity = ...                   # 0 to 1, 0.5 if it is not stated
-
-[sensor]
-# position = "below"                        # of a rangefinder: "below" or "above" the bob
-# mean_samples = ...                        # it gives the mean of its last so many distances
-# lag_s = { value = ..., u = ... }          # s, or it follows with a first-order lag
-
-# For springmass simulate and record --simulate; an analysis measures these:
-# [start]
-# displacement_m = ...                      # m, such as 0.05
-# [damping]                                 # dA/dt = -(mu + gamma A + beta A^2)
-# gamma_per_s = ...                         # such as 0.0073
-# beta_per_m_s = ...                        # such as 0.235
-# mu_m_per_s = ...
-"""
 
 
 def _mark(text: str) -> tuple[float, str]:
@@ -94,22 +55,20 @@ def scene(
         checked = read_scene(check)
         ask_about(checked, check)
         print(visible(f"{check}: a scene that states {stated_keys(checked)}"))
-        if checked == Scene():
-            LOG.log(HINT, f"write what you measured into {check}, and remove the # before it")
-            return OK
-        LOG.log(HINT, f"springmass analyse RECORDING --scene {shlex.quote(str(check))}")
+        todo = f"write what you measured into {check}, and remove the # before it"
+        LOG.log(HINT, todo if checked == Scene() else f"springmass analyse RECORDING --scene {shlex.quote(check)}")
         return OK
     if not recordings:
         if noted:
             raise ProgramError("--scene, --note, --mark and options of reading belong to a recording", "name it")
-        print(SCENE_TEMPLATE, end="")
+        print(Path(__file__).with_name("scene_template.toml").read_text("utf-8"), end="")
         LOG.log(HINT, "springmass scene > bench.toml, fill it in, springmass scene --check bench.toml")
         return OK
     if not noted:
         remedy = "give --scene, --note, --mark S=TEXT or an option of reading"
-        check = f"springmass scene --check {quoted(str(recordings[0]))}"
+        check = f"springmass scene --check {quoted(recordings[0])}"
         raise ProgramError(f"{recordings[0]}: nothing to save", f"{remedy}, or check a scene: {check}")
-    files, messages = files_of([str(each) for each in recordings])
+    files, messages = files_of(recordings)
     for line in messages:
         LOG.info(line)
     stated = None if scene is None else read_scene(scene)
@@ -136,5 +95,5 @@ def scene(
             LOG.warning(for_one(error, "scene", each.path, answers) if isinstance(error, NeedsAnswer) else error)
             codes.append(error.exit_code if isinstance(error, ProgramError) else UNREADABLE)
     if OK in codes:
-        LOG.log(HINT, f"springmass analyse {' '.join(shlex.quote(str(each)) for each in recordings)}")
+        LOG.log(HINT, f"springmass analyse {shlex.join(recordings)}")
     return of_several(codes)

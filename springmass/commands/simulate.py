@@ -1,7 +1,5 @@
 """``springmass simulate``: the motion that a scene predicts, its uncertainty, and the cost of computing it."""
 
-from __future__ import annotations
-
 import json
 import math
 import shlex
@@ -80,8 +78,9 @@ def simulate(
     where, say = str(against if scene is None else scene), sys.stderr if as_json else sys.stdout
     if run_file is not None and run_file.exists() and not overwrite:
         raise ProgramError(f"{visible(str(run_file))}: exists", "take another name, or --overwrite")
-    stated, run = None if scene is None else read_scene(scene), None
-    if scene is not None and stated is not None:
+    stated = run = None
+    if scene is not None:
+        stated = read_scene(scene)
         ask_about(stated, scene)
     if against is not None:
         run = Run.of(against, stated, AnalysisOptions(**reading.options.given()))
@@ -140,7 +139,8 @@ def _acting(effects: Sequence[Effect]) -> list[str]:
     """Return the effects with their sizes, and whether each is in the equation."""
     lines = ["effects          change of the motion, of the amplitude"]
     for effect in effects:
-        size = "" if effect.predicted is None else f"{effect.predicted:.2g}"
+        unit = "" if effect.unit == "1" else f" {effect.unit}"
+        size = "" if effect.predicted is None else f"{effect.predicted:.2g}{unit}"
         mark = "in " if effect.included else "out"
         lines.append(wrapped(f"  {mark}  {EFFECTS[effect.name]:<38} {size:>8}  {effect.why}", " " * 56))
     return lines

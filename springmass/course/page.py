@@ -1,7 +1,5 @@
 """Write the page of a course, with the runs that most need inspection first, and what to tell each group."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Mapping, Sequence
@@ -20,6 +18,7 @@ from springmass.course.benches import BENCHES, CourseComparison, disc_of
 from springmass.course.results_csv import COURSE, FAILED
 from springmass.result.advice import sentence
 from springmass.terminal.printing import visible_lines
+from springmass.typeset import count
 from storage.atomic import write_whole
 
 COURSE_PAGE, GROUPS_FILE = "index.html", "groups.txt"
@@ -154,10 +153,9 @@ def write_groups(folder: Path, lines: Sequence[Mapping[str, Any]], tags: Sequenc
         for line in group:
             for text in line["tell"]:
                 runs_of.setdefault(text, []).append(line["name"])
-        runs = f"{len(group)} run{'s' if len(group) > 1 else ''}"
         title = "All runs" if column is None else f"{tags[column]} {name}" if name else f"without {tags[column]}"
         texts = [f"  {', '.join(names)}: {text}" for text, names in runs_of.items()] or ["  nothing to mend"]
-        paragraphs.append("\n".join([f"{title}: {runs}", *texts]))
+        paragraphs.append("\n".join([f"{title}: {count(len(group), 'run')}", *texts]))
     text = visible_lines("\n\n".join(paragraphs))
     write_whole(folder / GROUPS_FILE, text.encode("utf-8", "backslashreplace") + b"\n")
 

@@ -21,7 +21,7 @@ from typing import Any
 
 from acquisition.recordings.identify import dialect_folder
 from acquisition.recordings.reading import READ_FIELDS, ValueKind
-from acquisition.regular_file import open_regular, read_regular
+from acquisition.regular_file import read_regular
 from pipeline.bench.law_names import ANY_LAW, law_names
 from pipeline.bench.scene import BENCH_KEYS, PLACES, Scene
 from pipeline.bench.typed import typed
@@ -31,6 +31,7 @@ from springmass.course.results_csv import RESERVED
 from springmass.errors import UNREADABLE, ProgramError
 from springmass.layout import part
 from springmass.loading.inputs import InputFile, files_of
+from springmass.loading.loaded import sha256_of
 from springmass.loading.notes import notes_paths
 from springmass.loading.options import ANALYSIS_DEFAULTS, AnalysisOptions
 from springmass.loading.scenes import read_scene
@@ -84,8 +85,8 @@ def plan(
     """Find the runs of a course and the known values of each.
 
     Inputs are files, folders with all their contents, and patterns; without inputs, the files that the table of runs
-    names. Scene and options are for all runs, and the table takes precedence. ``known`` are paths that an earlier pass
-    identified as recordings, ``output`` is left out.
+    names. Scene and options are for all runs, and the table takes precedence. ``known_paths`` were
+    identified as recordings by an earlier pass, ``output`` is left out.
     """
     table = None if runs_csv is None else read_table(runs_csv)
     out = {os.path.abspath(path) for path in (output, runs_csv) if path is not None}
@@ -176,8 +177,7 @@ def _commit() -> str:
 def digest_of(path: str) -> str:
     """Return the SHA-256 of a file in hexadecimal digits; empty if it cannot be read."""
     try:
-        with open_regular(path) as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
+        return sha256_of(Path(path))
     except (OSError, ValueError):
         return ""
 
@@ -235,12 +235,18 @@ class RunsTable:
         return os.path.normpath(os.path.join(glob.escape(os.path.abspath(self.path.parent)), text))
 
 
-def template(paths: Sequence[str]) -> str:
-    """Return a ``runs.csv`` to fill in, with one row per path."""
+def empty_table(paths: Sequence[str]) -> str:
+    """Return a ``runs.csv`` to fill in, with one row per path.
+
+    >>> empty_table(["#1.txt"]).splitlines()[1]
+    './#1.txt,,,,,,,,,,,,'
+    """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(TEMPLATE_COLUMNS)
-    writer.writerows([path, *[""] * (len(TEMPLATE_COLUMNS) - 1)] for path in paths)
+    # A row that begins with # is a remark.
+    named = [f"./{path}" if path.startswith("#") else path for path in paths]
+    writer.writerows([path, *[""] * (len(TEMPLATE_COLUMNS) - 1)] for path in named)
     return out.getvalue()
 
 

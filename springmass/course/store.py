@@ -4,8 +4,6 @@ Rows are added in batches of one transaction each, so after a crash a row is who
 off: a lock on ``course.lock`` keeps a second pass out, and that file names the process that holds it.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os
@@ -13,11 +11,11 @@ import platform
 import sqlite3
 import sys
 from collections.abc import Iterable, Iterator, Mapping
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from springmass.errors import LOG, UNREADABLE, ProgramError
+from springmass.loading.save import now_utc
 from storage.atomic import writing
 from storage.errors import WriteFailed
 from storage.locks import lock
@@ -91,8 +89,7 @@ def opened(folder: Path) -> Iterator[Store]:
             raise ProgramError(f"{folder}: in use by {holder}", "wait for its end") from error
         with writing(path):
             file.truncate(0)
-            since = datetime.now(UTC).isoformat(timespec="seconds")
-            file.write(f"process {os.getpid()} on {platform.node()} since {since}".encode("utf-8", "replace"))
+            file.write(f"process {os.getpid()} on {platform.node()} since {now_utc()}".encode("utf-8", "replace"))
             file.flush()
         with contextlib.closing(Store(folder)) as store:
             yield store

@@ -1,10 +1,8 @@
 """Recordings from arrays in memory: their units are read or refused, never ignored."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Collection, Mapping
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,7 +17,7 @@ from pipeline.track import F8, Track
 from springmass.loading.inputs import kind_of
 from springmass.loading.load import load
 from springmass.loading.loaded import Loaded
-from springmass.loading.options import AnalysisOptions, LoadOptions
+from springmass.loading.options import LOAD_FIELDS, AnalysisOptions
 
 EXPECTED = "a path, a run, a pair (t, y), or a dataset, frame or mapping with time and distance was expected"
 ABOUT = "springmass"
@@ -31,7 +29,7 @@ def loaded_of(source: Any, options: AnalysisOptions) -> Loaded:
 
     A dataset of springmass, or one that xarray read from a run file, comes with all that the file states.
     """
-    _demand(options, {"unit", "time_unit"}, type(source).__name__)
+    refuse_reading(options, type(source).__name__, ("unit", "time_unit"))
     t, y, flags = _columns(source)
     about: Mapping[str, Any] = getattr(source, "attrs", {})
     measure = _measure(options.unit or y.unit or _unit_of(y.values) or "m")
@@ -51,14 +49,9 @@ def loaded_of(source: Any, options: AnalysisOptions) -> Loaded:
     return Loaded(Recording("", "", SourceInfo(*info), "", samples), "memory")
 
 
-def refuse_reading(options: AnalysisOptions) -> None:
-    """Refuse options of reading for a run that was read before, on which they would have no effect."""
-    _demand(options, (), "run that is read already")
-
-
-def _demand(options: AnalysisOptions, allowed: Collection[str], what: str) -> None:
-    reading = {each.name for each in fields(LoadOptions)}
-    if others := [name for name in options.given() if name in reading and name not in allowed]:
+def refuse_reading(options: AnalysisOptions, what: str, allowed: Collection[str] = ()) -> None:
+    """Refuse options of reading for what is no file, on which they would have no effect."""
+    if others := [name for name in options.given() if name in LOAD_FIELDS and name not in allowed]:
         raise TrackError(f"{', '.join(others)} complete recordings named by a path, got a {what}", "leave that out")
 
 
@@ -149,9 +142,7 @@ def _by_headings(frame: Any) -> tuple[_ArrayColumn, _ArrayColumn]:
     others = [(name, unit) for name, words, unit in headings if not is_time(words)]
     if len(times) != 1 or len(others) != 1:
         named = ", ".join(repr(name) for name, *_ in headings)
-        raise TrackError(
-            f"one column of times and one of values were expected, got {named}", "choose two of them", between=": "
-        )
+        raise TrackError(f"one column of times and one of values were expected, got {named}", "choose two of them")
     return _ArrayColumn(frame[times[0][0]], times[0][1]), _ArrayColumn(frame[others[0][0]], others[0][1])
 
 
@@ -162,9 +153,7 @@ def _index_of(source: Any) -> Any:
     import pandas as pd
 
     if isinstance(source.index, pd.RangeIndex):
-        raise TrackError(
-            "its index counts rows and is no time", 'give times as its index, or as a column "time"', between=": "
-        )
+        raise TrackError("its index counts rows and is no time", 'give times as its index, or as a column "time"')
     return source.index
 
 
@@ -179,9 +168,7 @@ def _unit_of(values: Any) -> str:
 def _measure(unit: str) -> units.Measure:
     measure = units.measure_of(unit.replace("**", "^").replace(" ", ""))
     if measure is None:
-        raise TrackError(
-            f"unknown unit {unit!r} of the values", f"give unit=, one of {', '.join(units.MEASURES)}", between=": "
-        )
+        raise TrackError(f"unknown unit {unit!r} of the values", f"give unit=, one of {', '.join(units.MEASURES)}")
     return measure
 
 
@@ -189,11 +176,11 @@ def _numbers(values: Any, what: str) -> F8:
     """Return numbers as an array; masked values are missing, and complex ones are refused."""
     plain = np.ma.asarray(getattr(values, "magnitude", values))
     if plain.dtype.kind == "c":
-        raise TrackError(f"{what} are complex numbers", "give their real part, or their absolute value", between=": ")
+        raise TrackError(f"{what} are complex numbers", "give their real part, or their absolute value")
     try:
         return np.asarray(np.ma.filled(plain.astype(np.float64), np.nan))
     except (TypeError, ValueError):
-        raise TrackError(f"{what} are no numbers, but {plain.dtype}", "convert them first", between=": ") from None
+        raise TrackError(f"{what} are no numbers, but {plain.dtype}", "convert them first") from None
 
 
 def _seconds(t: Any, unit: str) -> F8:
@@ -211,7 +198,5 @@ def _seconds(t: Any, unit: str) -> F8:
         return np.asarray(times / np.timedelta64(1, "s"), np.float64)
     measure = units.time_unit(unit or "s")
     if measure is None:
-        raise TrackError(
-            f"unknown unit {unit!r} of the times", f"give time_unit=, one of {', '.join(units.TIMES)}", between=": "
-        )
+        raise TrackError(f"unknown unit {unit!r} of the times", f"give time_unit=, one of {', '.join(units.TIMES)}")
     return np.asarray(_numbers(t, "times") * (10.0**measure.power * measure.factor))

@@ -1,7 +1,5 @@
 """Find the files that an input names: the file itself, or the recordings in a folder; tell what a file is."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
@@ -95,24 +93,22 @@ def _in_folder(
             f"{folder}: cannot read the folder ({error.strerror})", "name another", UNREADABLE
         ) from error
     names = {path.name for path in files}
-    pairs = {path.name: name for path in files if (name := _velocity_of(path)) in names}
-    made = {path.name for path in files if path.suffix == ".wire" and f"{path.stem}.h5" in names}
-    parts = made.union(pairs.values())
-    taken = [
-        path for path in files if path.name not in parts and (os.path.abspath(path) in known or is_recording(path))
-    ]
-    kept = {path.name for path in taken} | parts
-    paired = [(path, folder / pairs[path.name] if path.name in pairs else None) for path in taken]
-    return (
-        [InputFile(str(path), None if velocity is None else str(velocity), number) for path, velocity in paired],
-        [path.name for path in files if path.name not in kept],
-    )
+    velocities = {path.name: name for path in files if (name := _velocity_of(path)) in names}
+    logs = {path.name for path in files if path.suffix == ".wire" and f"{path.stem}.h5" in names}
+    parts, taken, others = logs.union(velocities.values()), list[InputFile](), list[str]()
+    for path in (path for path in files if path.name not in parts):
+        if os.path.abspath(path) in known or is_recording(path):
+            velocity = str(folder / velocities[path.name]) if path.name in velocities else None
+            taken.append(InputFile(str(path), velocity, number))
+        else:
+            others.append(path.name)
+    return taken, others
 
 
-def _velocity_of(path: Path) -> str | None:
-    """Return the name of the velocity file that would belong to a position file; None for any other."""
+def _velocity_of(path: Path) -> str:
+    """Return the name of the velocity file that would belong to a position file; empty for any other."""
     stem = path.stem.removesuffix("_position")
-    return None if stem == path.stem else f"{stem}_velocity{path.suffix}"
+    return "" if stem == path.stem else f"{stem}_velocity{path.suffix}"
 
 
 def kind_of(path: str | os.PathLike[str]) -> Literal["run", "wire", "recording"]:

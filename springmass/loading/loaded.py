@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -13,15 +13,21 @@ from typing import Any
 import numpy as np
 
 from acquisition.block import Block, SourceInfo
+from acquisition.decoders.sensor import RESONATOR_PPM
+from acquisition.events import Triggered, recorded_events
+from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S, Calibration
+from acquisition.live.clock_fit import facts_of, fit_clock
 from acquisition.recordings.recording import FormatIssue, Original, Recording
 from acquisition.regular_file import open_regular
 from pipeline.track import Track
 from springmass.errors import UNREADABLE, ProgramError
 from springmass.loading.options import AnalysisOptions
-from springmass.loading.track import between, to_track
 from storage.run_file.reading import open_run
 
 UNVERIFIED = "unverified"
+MOTION_SENSOR = "motion-sensor"  # family that assumes a fixed speed of sound
+LINE_PROTOCOL = "line-protocol"  # family that sends echo times
+COMPARED = {"rate_error_ppm", "u_rate_error_ppm", "span_s", "held_readings", "longest_stall_s"}  # of two clocks
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,9 +86,7 @@ class Loaded:
     @cached_property
     def track(self) -> Track:
         """The samples that the pipeline analyses."""
-        recording = self.recording
-        track = to_track(self.samples, self.info, recorded_format=recording.format, provenance=self.provenance)
-        track = between(track, self.from_s, self.to_s)
+        track = _between(_track_of(self.recording, self.provenance), self.from_s, self.to_s)
         if self.clock_ppm is None:
             return track
         bound = 1e-6 * self.clock_ppm
@@ -121,3 +125,71 @@ def sha256_of(path: Path) -> str:
     """Return the digest of a file's bytes."""
     with open_regular(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _track_of(recording: Recording, provenance: Mapping[str, Any]) -> Track:
+    """Return the samples of a recording as a track for the pipeline.
+
+    The noise stated by a source is passed on. The error column of a file is not noise and is passed on separately.
+    """
+    samples, info = recording.samples, recording.info
+    # But for its name, a track states what a source states under the same names.
+    of_source = {**asdict(info), "u_rate": info.u_rate or 0.0}
+    del of_source["name"]
+    moments = [t_s for t_s, event in recorded_events(provenance) if isinstance(event.typed, Triggered)]
+    return Track(
+        t=samples.t,
+        y=samples.distance,
+        flags=samples.flags,
+        **of_source,
+        velocity=samples.velocity,
+        unit=samples.unit,
+        trigger_s=float(moments[0]) if moments else None,  # when the bob left its rest position
+        **_clock_comparison(samples, info, provenance),
+        **_scale(recording.format, provenance.get("sensor") or {}),
+    )
+
+
+def _clock_comparison(samples: Block, info: SourceInfo, provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the device clock's rate relative to the host's, if both timestamps exist, and its largest rate error."""
+    noted = provenance.get("decoding", {}).get("clock", {})
+    if info.clock != "device":
+        return {}
+    if noted.keys() >= COMPARED:
+        comparison = noted  # by the pings, whose times are in no sample; files of earlier versions may lack it
+    elif samples.host_ns is not None and (samples.host_ns >= 0).all():
+        comparison = facts_of(fit_clock(samples.t, samples.host_ns))
+    else:
+        return {}
+    clock = {
+        "clock_limit": 1e-6 * noted.get("limit_ppm", RESONATOR_PPM),
+        "held_samples": comparison["held_readings"],
+        "longest_stall_s": comparison["longest_stall_s"],
+    }
+    if comparison["rate_error_ppm"] is None or comparison["u_rate_error_ppm"] is None:
+        return clock
+    rate, u_rate = comparison["rate_error_ppm"] * 1e-6, comparison["u_rate_error_ppm"] * 1e-6
+    return {**clock, "rate_error": rate, "u_rate_error": u_rate, "compared_s": comparison["span_s"]}
+
+
+def _scale(recorded_format: str, sensor: Mapping[str, Any]) -> dict[str, Any]:
+    """Return how distances were calculated: the speed of sound, if it is known, and the calibration's uncertainties."""
+    if recorded_format == MOTION_SENSOR:
+        return {"sonic": True, "speed_of_sound_m_per_s": SPEED_OF_SOUND_M_PER_S}
+    if not sensor:
+        return {}
+    calibration = Calibration.from_mapping(sensor.get("calibration", {}))
+    scale = {"sonic": True, "u_scale": calibration.u_scale, "u_offset_m": calibration.u_offset_m}
+    # Families that send distances instead of echo times have applied an unknown speed of sound.
+    if sensor.get("family") == LINE_PROTOCOL or sensor.get("options", {}).get("unit") == "us":
+        scale["speed_of_sound_m_per_s"] = calibration.speed_of_sound_m_per_s
+    return scale
+
+
+def _between(track: Track, low_s: float, high_s: float) -> Track:
+    """Return the samples between two times, both included; all samples if neither time is finite."""
+    if math.isinf(low_s) and math.isinf(high_s):
+        return track
+    keep = (track.t >= low_s) & (track.t <= high_s)
+    velocity = None if track.velocity is None else track.velocity[keep]
+    return replace(track, t=track.t[keep], y=track.y[keep], flags=track.flags[keep], velocity=velocity)

@@ -47,6 +47,9 @@ def results_name(path: Path, *, run: str | None = None, channel: str | None = No
 
     A text keeps its whole name, because ``bob.txt`` and ``bob.csv`` are two recordings; the run and the channel that
     were chosen follow, because each has its own results.
+
+    >>> results_name(Path("bob.csv"), channel="a b"), results_name(Path("bob.csv"), channel="a_b")
+    ('bob.csv.a-b.results', 'bob.csv.a_b.results')
     """
     name = "stdin" if str(path) == STDIN else path.name if kind_of(path) == "recording" else path.stem
     chosen = [_distinct(part) for part in (run, channel) if part is not None]
@@ -54,10 +57,10 @@ def results_name(path: Path, *, run: str | None = None, channel: str | None = No
 
 
 def _distinct(text: str) -> str:
-    """Return a safe name that other texts do not share: with a digest if more than spaces was replaced or cut."""
+    """Return a safe name that no other text has: with hyphens for spaces, and a digest if anything else is not kept."""
     safe = safe_name(text)
-    if safe == text.replace(" ", "_"):
-        return safe
+    if "-" not in text and safe_name(hyphened := text.replace(" ", "-")) == hyphened:
+        return hyphened
     return f"{safe}-{hashlib.sha256(text.encode(errors='backslashreplace')).hexdigest()[:8]}".lstrip("-")
 
 

@@ -3,8 +3,6 @@
 A ``Worker`` does what may fail or wait, such as showing the recording, on a thread of its own.
 """
 
-from __future__ import annotations
-
 import contextlib
 import queue
 import threading
@@ -13,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from acquisition.events import StoredEvent
+from springmass.typeset import count
 from storage.errors import one_line
 
 LAST_STEP_S = 1.0
@@ -55,8 +54,8 @@ class Failures:
     def describe(self) -> list[str]:
         """Return a readable line for each kind of failure."""
         return [
-            f"during the recording, which went on, {count} time{'s' * (count > 1)}: {name}"
-            for name, count in self.counts.items()
+            f"during the recording, which went on, {count(times, 'time')}: {name}"
+            for name, times in self.counts.items()
         ]
 
 

@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 
 import springmass
+from springmass.charts import draw
 from springmass.cli import main
 from springmass.errors import LOG
 
@@ -105,6 +106,12 @@ def cli(capsys: pytest.CaptureFixture[str]) -> Callable[..., Done]:
         return Done(code, captured.out, captured.err)
 
     return run
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let no picture be drawn, which takes most of the time; whether there is one is seen from its name."""
+    monkeypatch.setattr(draw, "render", lambda _, kinds: dict.fromkeys(kinds, b"<svg/>"))
 
 
 @pytest.fixture(scope="session")

@@ -7,11 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
-import springmass
-from acquisition.block import Flag
 from tests.cli.conftest import Cli
 
 Write = Callable[..., Path]
@@ -31,48 +28,6 @@ def refused(done: Any, path: Path, *words: str) -> None:
     assert done.complaint.startswith(f"springmass: {path}")
     assert "; " in done.complaint or "? springmass " in done.complaint  # what to do stands behind it
     assert all(word in done.complaint for word in words)
-
-
-@pytest.mark.parametrize(
-    "content",
-    [
-        b"",
-        bytes(range(256)) * 40,
-        b"\x89PNG\r\n\x1a\n" + bytes(3000),
-        b" \r\n\r\n",
-        b"\x89HDF\r\n\x1a\n" + bytes(300),
-        b"\0\0\0\x20ftypisom" + bytes(99),
-        b"Motion Sensor Data File Mar 12, 2024 2:05 PM",
-        b"Dear diary,\r\ntoday we hung a mass.\r\n",
-        b"0.01\t25.3 " * 2000,
-    ],
-)
-def test_what_is_no_recording_is_refused(cli: Cli, tmp_path: Path, content: bytes) -> None:
-    """Empty, binary, blank, damaged and foreign files are refused by every command alike."""
-    path = tmp_path / "run.txt"
-    path.write_bytes(content)
-    for command in COMMANDS:
-        refused(run(cli, command, path, tmp_path / "out.h5"), path)
-    assert [file.name for file in tmp_path.iterdir()] == ["run.txt"]
-
-
-@pytest.mark.parametrize(
-    ("content", "options"),
-    [
-        (b"0.010\t25.334\r\n0.020\t25.648\r\n0.030\t25.700\r\n", ("--unit",)),
-        (b"Latest: Time (s),Run 1: Time (s),Latest: x (m),Run 1: x (m)\n0,0,1,1\n", ("--run",)),
-        (b"time;position;velocity\n0,1;0,2;0,3\n0,2;0,2;0,3\n", ("--channel", "--unit")),
-    ],
-)
-def test_what_a_file_leaves_open_is_asked_for(
-    cli: Cli, tmp_path: Path, content: bytes, options: tuple[str, ...]
-) -> None:
-    """Unit, run and channel are asked for by the options of the command that was typed; nothing is written."""
-    path = tmp_path / "run.txt"
-    path.write_bytes(content)
-    for command in ("analyse", "convert"):
-        refused(run(cli, command, path, tmp_path / "out.h5"), path, f"springmass {command}", *options)
-    assert [file.name for file in tmp_path.iterdir()] == ["run.txt"]
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -98,28 +53,6 @@ def analysed(cli: Cli, path: Path) -> Any:
     done = cli("analyse", "--json", path)
     assert (done.code, done.err) == (0, "")
     return done.results[0]
-
-
-def test_a_damaged_row_is_a_flagged_sample(cli: Cli, write: Write, rows: list[bytes]) -> None:
-    """A row whose numbers were hit keeps its place in time and has no distance."""
-    path = write([*rows[:300], b"3.0#0\t1x.500\t0.239", *rows[301:]])
-    result = analysed(cli, path)
-    assert (result["quality"]["missing"], result["quality"]["malformed_rows"]) == (1, 1)
-    samples = springmass.load(path).loaded.samples
-    assert np.flatnonzero(samples.flags).tolist() == [300]
-    assert np.isnan(samples.distance[300])
-    assert samples.flags[300] == Flag.MISSING | Flag.MALFORMED
-
-
-@pytest.mark.parametrize("last", [b"9.990\t16.82", b"9.990\t16.822\t0.2"])
-def test_a_truncated_last_row_is_never_a_value(cli: Cli, write: Write, rows: list[bytes], last: bytes) -> None:
-    """Wherever the writer stopped, its last row is a missing sample, counted and told."""
-    path = write([*rows[:-1], last])
-    result = analysed(cli, path)
-    assert (result["quality"]["missing"], result["quality"]["malformed_rows"]) == (1, 1)
-    assert result["input"]["samples"] == len(rows)
-    assert "truncated_row" in {f["code"] for f in result["findings"]}
-    assert np.isnan(springmass.load(path).loaded.samples.distance[-1])
 
 
 def test_a_last_row_cut_inside_its_time_is_left_out_and_told(cli: Cli, write: Write, rows: list[bytes]) -> None:

@@ -30,32 +30,12 @@ def scene(folder: Path, law: str) -> Path:
     return path
 
 
-def test_a_law_is_stated_by_an_option_and_never_noted(cli: Cli, run: Path) -> None:
-    """The result holds the law, and nothing is written next to the recording."""
-    done = cli("analyse", run, "--law", "linear", "--json")
-    (result,) = done.results
-    damping = result["damping"]
-    assert (damping["selected"], damping["stated"], damping["law"]) == ("linear", "linear", "linear")
-    assert result["provenance"]["parameters"]["law"] == "linear"
-    assert "law" not in result["provenance"]["parameters"]["scene"].get("damping", {})
-    assert result["estimates"]["damping_rate"]["value"] == pytest.approx(damping["coefficients"]["gamma"]["value"])
-    assert not list(run.parent.glob("*.about.toml"))
-
-
 def test_a_law_of_a_scene_file_is_named_first(cli: Cli, run: Path) -> None:
     """The first line of the output names the law; an option takes precedence over the file."""
     bench = scene(run.parent, "linear")
     assert "linear" in cli("analyse", run, "--scene", bench, "--no-report").out.splitlines()[0]
     (free,) = cli("analyse", run, "--scene", bench, "--law", "any", "--json").results
     assert free["damping"]["stated"] is None
-
-
-def test_a_law_that_does_not_exist_is_refused(cli: Cli, run: Path) -> None:
-    """Option and scene file list the laws."""
-    assert "linear+quadratic" in cli("analyse", run, "--law", "cubic", "--no-report").complaint
-    done = cli("analyse", run, "--scene", scene(run.parent, "cubic"), "--no-report")
-    assert done.code == 2
-    assert "linear+quadratic" in done.complaint
 
 
 def test_batch_takes_a_law_for_all_runs_and_for_each(cli: Cli, run: Path) -> None:

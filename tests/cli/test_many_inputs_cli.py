@@ -50,6 +50,7 @@ def test_several_inputs_share_one_table_and_one_report(cli: Cli, bench: Path, tm
             assert values[run.stem, name] == estimate["value"]
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_report_of_other_runs_keeps_no_file_of_the_earlier_runs(cli: Cli, bench: Path, tmp_path: Path) -> None:
     """Tables and figures of the earlier runs go; the files that a person put there stay."""
     a, b, c, d = (bench / f"{name}.txt" for name in "abcd")

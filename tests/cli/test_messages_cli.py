@@ -85,19 +85,27 @@ def test_a_defect_met_on_one_of_several_inputs_leaves_the_others(cli: Cli, recor
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
-def test_a_full_output_is_one_line(recording: Path) -> None:
+def test_a_full_output_is_one_line() -> None:
     """What cannot be written to is named, without a traceback, not even when Python ends."""
     with open("/dev/full", "wb") as full:
-        done = subprocess.run(
-            [sys.executable, "-m", "springmass", "analyse", "--json", str(recording)],
-            stdout=full,
-            stderr=subprocess.PIPE,
-            text=True,
-            cwd=Path(__file__).resolve().parents[2],
-        )
+        command = [sys.executable, "-m", "springmass", "explain", "clipped"]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True)
     assert done.returncode == USAGE
     (line,) = done.stderr.splitlines()
     assert line.startswith("springmass: standard output")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pipes end otherwise there")
+def test_a_reader_that_goes_away_ends_it_quietly(recording: Path) -> None:
+    """``springmass replay ... | head`` is no failure."""
+    command = [sys.executable, "-m", "springmass", "replay", str(recording), "--loop", "--speed", "max"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        assert process.stdout.readline()
+        process.stdout.close()
+        assert process.stderr.read() == ""
+        assert process.wait(timeout=120) == 0
 
 
 def test_quiet_holds_for_one_command_alone(cli: Cli, recording: Path) -> None:

@@ -25,7 +25,6 @@ import serial.tools.list_ports
 from cyclopts.argument import Argument
 from serial.tools.list_ports_common import ListPortInfo
 
-from springmass.charts import draw
 from springmass.cli import main
 from springmass.commands import COMMANDS, app
 from springmass.errors import LOG
@@ -114,7 +113,7 @@ SHOWN: dict[str, Shown] = {
         "--runs": ("runs.csv",),
         "--template": ("", "batch short.txt"),
         "--scene": ("bench.toml",),
-        "--jobs": ("1", "-v batch short.txt other.txt two.csv bare.csv rows.csv --reports 0 -o out"),
+        "--jobs": ("2", "batch short.txt -o out --dask tcp://x", "--jobs"),
         "--dask": ("nothing://here", "batch short.txt -o out"),
         "--reports": ("1", "batch short.txt --jobs 1 -o out --reports=0"),
         "--read": ("channel=x", "batch two.csv --jobs 1 --reports 0 -o out"),
@@ -209,11 +208,11 @@ SHOWN: dict[str, Shown] = {
         "--read": ("channel=x", "simulate --scene bench.toml --json --against two.csv"),
     },
     "trade": {
-        "": ("trade --seeds=1 --seconds=8 --json",),
-        "--scene": ("bench.toml", "trade --seeds=1 --seconds=8 --json", '"frequency": 1.59'),
-        "--seeds": ("2", "trade --seconds=8 --json", '"seeds": 2'),
-        "--seconds": ("8", "trade --seeds 1 short.txt --json"),
-        "--json": ("", "trade --seeds=1 --seconds=8", '"schema": 1'),
+        "": ("trade --seeds=1 --seconds=5 --json",),
+        "--scene": ("bench.toml", "trade --seeds=1 --seconds=5 --json", '"frequency": 1.59'),
+        "--seeds": ("2", "trade --seconds=5 --json", '"seeds": 2'),
+        "--seconds": ("5", "trade --seeds 1 short.txt --json"),
+        "--json": ("", "trade --seeds=1 --seconds=5", '"schema": 1'),
         "--read": ("channel=nope", "trade two.csv --seeds 1 --json", "nope"),
     },
     "firmware": {
@@ -322,8 +321,6 @@ def outcome(files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Ite
     """Return what gives the exit code of a call, and all that it prints and writes, as a text."""
     board = Board()
     monkeypatch.setenv("BROWSER", "true")
-    # Drawing would take most of the time; whether there is a picture is seen from its name.
-    monkeypatch.setattr(draw, "render", lambda _, kinds: dict.fromkeys(kinds, b"<svg/>"))
     monkeypatch.setenv("HOME", str(tmp_path / "home"))  # where an icon of the window is put
     port = ListPortInfo(board.port)
     monkeypatch.setattr(serial.tools.list_ports, "comports", lambda *_, **__: [port])
@@ -367,6 +364,7 @@ def stable(outcome: tuple[int, str]) -> tuple[int, str]:
     return outcome[0], " ".join(NOISE.sub("", outcome[1]).split())
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("command", COMMANDS)
 def test_each_option_shows_or_is_refused(outcome: Callable[[str], tuple[int, str]], command: str) -> None:
     """With a value that matters, the call gives something else; a refusal is one line."""

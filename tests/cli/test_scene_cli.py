@@ -50,15 +50,6 @@ def test_the_template_states_nothing_until_it_is_filled_in(cli: Cli, tmp_path: P
     assert len(stated_keys(read_scene(path)).split(", ")) == len(re.findall(r"^# \w+ = ", text, re.MULTILINE))
 
 
-def test_a_check_asks_about_values_and_refuses_what_cannot_be(cli: Cli, tmp_path: Path) -> None:
-    """Grams are asked about, an unknown key is exit code 2."""
-    path = tmp_path / "bench.toml"
-    path.write_text("[bob]\nmass_kg = 217.6\n")
-    assert "mass of the bob" in cli("scene", "--check", path).err
-    path.write_text("[bob]\nmass_g = 217.6\n")
-    assert cli("scene", "--check", path).code == 2
-
-
 def test_a_scene_given_as_a_recording_gets_the_command_that_checks_it(cli: Cli, tmp_path: Path) -> None:
     """The line ends in a command that works."""
     path = tmp_path / "my bench.toml"

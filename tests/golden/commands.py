@@ -67,11 +67,16 @@ def outcome(places: Places, words: list[str]) -> Table:
         return table | {"rows": len(rows), "sha256": _digest("\n".join(rows).encode())}
     for number, line in enumerate(filter(None, out.splitlines())):
         with contextlib.suppress(json.JSONDecodeError):
-            result = json.loads(line)
+            result = json.loads(line, parse_constant=_no_json)
             table |= _invalid(result) | dict(_leaves(_prepared(result), str(number) if number else ""))
     if words[0] == "scene":
         table["keys"] = " ".join(sorted(re.findall(r"\[\w+\] \w+|\b\w+_(?:implausible|unusual)\b", out))) or "none"
     return table
+
+
+def _no_json(constant: str) -> str:
+    """Return what stands for NaN and the infinities, which are no JSON."""
+    return f"{constant} is no JSON"
 
 
 def _invalid(result: Any) -> Table:

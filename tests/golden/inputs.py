@@ -188,6 +188,10 @@ _ODD: dict[str, Callable[[], str | bytes]] = {
     "not.toml": lambda: "[bob\n",
     "stiff.toml": lambda: '[bob]\nmass_kg = 0.2\n[spring]\nconstant_n_per_m = "fourteen"\n',
     "heavy.toml": lambda: "[bob]\nmass_kg = 217.6\n",
+    "soft.toml": lambda: (
+        "[bob]\nmass_kg = 0.2\n[start]\ndisplacement_m = 0.05\n"
+        "[spring]\nconstant_n_per_m = 20\ncubic_n_per_m3 = -9000\n"
+    ),
     "no-spring.toml": lambda: "[bob]\nmass_kg = 0.2\n",
     "reported.csv": lambda: (
         "run,name,value,u,unit\ndamped_simulated_position,T,0.79,0.01,s\n"

@@ -14,7 +14,7 @@ from acquisition.block import UNITS
 from acquisition.recordings.identify import open_recording
 from pipeline.analyse import Analysis, analyse
 from pipeline.track import Track
-from springmass.loading.track import to_track
+from springmass.loading.loaded import Loaded
 from tests.sampling import sampled
 
 SEEDS = range(6)
@@ -81,7 +81,7 @@ def test_what_is_no_oscillation_gets_no_period(tmp_path: Path, kind: Callable[[n
         rows = (f"{a:.3f},{b:.6g}" for a, b in zip(t, y, strict=True))
         path.write_text("\n".join([f"t (s),{draw.choice(HEADINGS)}", *rows]), encoding="utf-8")
         recording = open_recording(path)
-        found = analyse(to_track(recording.samples, recording.info))
+        found = analyse(Loaded(recording, recording.format).track)
         period = found.estimates.get("period")
         warnings = [each.code for each in found.findings if each.severity != "info"]
         if period is not None and period.u < SMALL * period.value and not warnings:

@@ -14,7 +14,7 @@ from acquisition.recordings.questions import Missing
 from acquisition.recordings.reading import ReadOptions
 from pipeline.analyse import Analysis, analyse
 from pipeline.track import UNUSABLE
-from springmass.loading.track import to_track
+from springmass.loading.loaded import Loaded
 from tests.sampling import sampled
 
 Given = dict[str, Any]
@@ -67,7 +67,7 @@ def test_a_workbook_of_results_is_no_recording(recordings: Path) -> None:
 def analysed(path: Path, given: Given) -> tuple[Analysis, np.ndarray, np.ndarray]:
     """Return the analysis, and the times and values that it used."""
     recording = open_recording(path, ReadOptions.of(given))
-    found = analyse(to_track(recording.samples, recording.info))
+    found = analyse(Loaded(recording, recording.format).track)
     used = (found.flags & UNUSABLE) == 0
     return found, recording.samples.t[used], recording.samples.distance[used]
 

@@ -14,8 +14,9 @@ import pytest
 from acquisition.block import Flag, concatenate
 from acquisition.decoders.registry import get_family
 from acquisition.live.decoding import SensorChain
+from acquisition.recordings.recording import Recording
 from pipeline.analyse import analyse
-from springmass.loading.track import to_track
+from springmass.loading.loaded import Loaded
 from tests.adapters import PERIOD_S, Adapter, delivered
 
 SEEDS = min(20, int(os.environ.get("SPRINGMASS_TRIALS", "2")))
@@ -34,7 +35,7 @@ def test_periods_behind_an_adapter(latency_s: float) -> None:
             chain = SensorChain(get_family("text-lines"), options={"unit": "cm"})
             reads, _ = delivered(adapter, 30.0, seed)
             block = chain.settle(concatenate([chain.feed(host_ns, data) for host_ns, data in reads]))
-            run = analyse(to_track(block, chain.info("port"), recorded_format="wire"))
+            run = analyse(Loaded(Recording("wire", "", chain.info("port"), "", block), "wire").track)
             period = run.estimates["period"]
             z.append((period.value - PERIOD_S) / period.u)
             u_ppm.append(1e6 * period.u / PERIOD_S)

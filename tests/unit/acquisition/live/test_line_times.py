@@ -10,9 +10,10 @@ import pytest
 from acquisition.block import Block, Flag, concatenate
 from acquisition.decoders.registry import get_family
 from acquisition.live.decoding import SensorChain
+from acquisition.recordings.recording import Recording
 from pipeline.analyse import analyse
 from springmass import load
-from springmass.loading.track import to_track
+from springmass.loading.loaded import Loaded
 from storage.run_file.writing import run_writer
 from tests.adapters import NOISE_M, PERIOD_S, U_CRYSTAL, Adapter, bob_m, delivered
 
@@ -54,7 +55,7 @@ def test_the_times_of_lines_follow_from_their_arrivals(adapter: Adapter, rms_s: 
 def test_the_noise_behind_an_adapter_is_that_of_the_sensor() -> None:
     """With 5 % of the lines lost, noise is found within 10 %, the period within 4 u, and 99 % are used."""
     chain, block, _ = decoded(Adapter(0.016, lost=0.05), 30.0, 3)
-    run = analyse(to_track(block, chain.info("port"), recorded_format="wire"))
+    run = analyse(Loaded(Recording("wire", "", chain.info("port"), "", block), "wire").track)
     assert run.estimates["noise"].value == pytest.approx(NOISE_M, rel=0.1)
     assert abs(run.estimates["period"].value - PERIOD_S) < 4.0 * run.estimates["period"].u
     assert np.mean((run.flags & ~np.uint8(Flag.GAP_BEFORE)) == 0) > 0.99
