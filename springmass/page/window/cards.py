@@ -435,17 +435,17 @@ def _joined(answer: Mapping[str, Any]) -> str:
     return f"{problem}. {remedy}." if remedy else f"{problem}."
 
 
-Cell = Annotated[str, msgspec.Meta(max_length=100)]
-Note = Annotated[str, msgspec.Meta(max_length=4000)]
+ShortText = Annotated[str, msgspec.Meta(max_length=100)]
+LongText = Annotated[str, msgspec.Meta(max_length=4000)]
 FORMS: Mapping[str, Any] = {
     **dict.fromkeys(("from_s", "to_s"), float | None),
-    **dict.fromkeys(("law", "accuracy"), Cell | None),
-    "notes": Note,
-    "answers": dict[str, Note],
-    "bench": dict[str, dict[str, Cell]],
+    **dict.fromkeys(("law", "accuracy"), ShortText | None),
+    "notes": LongText,
+    "answers": dict[str, LongText],
+    "bench": dict[str, dict[str, ShortText]],
     "scene": dict[str, Any] | None,
-    **dict.fromkeys(("rows", "hooke"), list[list[Cell]]),
-    "columns": list[Cell],
+    **dict.fromkeys(("rows", "hooke"), list[list[ShortText]]),
+    "columns": list[ShortText],
 }
 """The form of each field that a page sends."""
 
