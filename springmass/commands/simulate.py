@@ -28,7 +28,7 @@ from springmass.simulations.simulation import (
     beside_measured,
     prediction,
     simulated,
-    summary,
+    simulation_json,
 )
 from springmass.terminal.printing import aligned, wrapped
 
@@ -111,7 +111,7 @@ def simulate(
         of_scene = "" if scene is None else f" --scene {shlex.quote(where)}"
         LOG.log(HINT, f"springmass analyse {shlex.quote(str(run_file or made / 'run.h5'))}{of_scene}")
     if as_json:
-        print(json.dumps(summary(simulation)))
+        print(json.dumps(simulation_json(simulation)))
     return OK
 
 

@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from springmass.charts.browser import report_script
 from springmass.course.benches import compare_rows
 from springmass.course.executors import outcomes, workers
 from springmass.course.page import line_of, mark, write_groups, write_page
@@ -15,7 +16,7 @@ from springmass.course.results_csv import COURSE, FAILED, write_results
 from springmass.course.store import Store
 from springmass.course.worker import Remedy, analyse_one, blank_row, write_report_of
 from springmass.errors import LOG, ProgramError
-from springmass.report.html import SHARED, report_script
+from springmass.report.html import SHARED
 from springmass.result.output_names import safe_name
 from springmass.runs.tasks import Task
 from springmass.terminal.progress import counting

@@ -251,7 +251,7 @@ def test_the_server_ends_when_its_pages_are_gone(tmp_path: Path, monkeypatch: py
 
     async def ends(pages: int, recording: bool) -> bool:
         cards = Cards(tmp_path)
-        monkeypatch.setattr(served, "prepare", lambda: None)
+        monkeypatch.setattr(cards.children, "prepare", lambda: None)
         monkeypatch.setattr(type(cards.recorder), "running", recording)
         window, over = served.Window(cards), asyncio.Event()
         window.pages, window.quiet_s = pages, 0.0
