@@ -100,8 +100,7 @@ def drag_curve(damping: Damping, windows: Windows, factor: Estimate, laws: Seque
     variance = (y * factor.u / factor.value) ** 2
     for fit, weight in ((one.fit, one.weight) for one in laws):
         gradient = fit.by_parameters(functools.partial(coefficient, fit))
-        own = np.einsum("in,ij,jn->n", gradient, fit.joint.covariance, gradient)
-        variance += weight * (np.maximum(own, 0.0) + (coefficient(fit, fit.joint.values) - y) ** 2)
+        variance += weight * (fit.u_of(gradient) ** 2 + (coefficient(fit, fit.joint.values) - y) ** 2)
     return Curve(x, y, np.sqrt(variance), "", *_local_drag(damping, windows, factor.value))
 
 
