@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,6 @@ from uncertainties import nominal_value
 from pipeline.bench.scene import Scene
 from pipeline.checks.echoes import count_quality
 from pipeline.damping.select import NO_LAWS, Damping
-from pipeline.errors import AnalysisError
 from pipeline.findings.finding import Finding
 from pipeline.motion.fitted import Oscillation
 from pipeline.motion.kinds import Motion
@@ -29,7 +29,7 @@ from pipeline.samples.condition import Samples
 from pipeline.track import U8, UNUSABLE, Track
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Analysis:
     """The analysis of one run.
 
@@ -88,22 +88,22 @@ class Analysis:
         """The number of samples with each flag, and the number of samples used."""
         return count_quality(self.flags)
 
+    @cached_property
     @one_thread
-    def smoothed(self) -> Smoothed:
-        """Return position, velocity and acceleration at every sample from the fit, with their uncertainties.
+    def smoothed(self) -> Smoothed | None:
+        """Position, velocity and acceleration at every sample from the fit of an oscillation, with their uncertainties.
 
         >>> import numpy as np
         >>> from pipeline.analyse import analyse
         >>> t = np.arange(1000) / 100
         >>> y = 0.2 + 0.05 * np.cos(8.3 * t) + 3e-4 * np.random.default_rng(1).standard_normal(1000)
-        >>> motion = analyse(Track.from_arrays(t, y)).smoothed()
+        >>> motion = analyse(Track.from_arrays(t, y)).smoothed
         >>> error = motion.velocity + 0.05 * 8.3 * np.sin(8.3 * t)
         >>> bool(np.std(error) < 0.002 * 0.05 * 8.3)
         True
         """
-        if not isinstance(self.motion, Oscillation):
-            raise AnalysisError(f"there is no oscillation to smooth: {self.why}")
-        return kinematics(self.track, self.motion, self.derived.laws)
+        motion = self.oscillation
+        return None if motion is None else kinematics(self.track, motion, self.derived.laws)
 
     def energy_curve(self) -> Curve | None:
         """Return the mechanical energy against time with its band, in J, or in J/kg if no mass is known."""

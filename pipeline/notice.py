@@ -31,8 +31,7 @@ RefusalCode = Literal[
     "thin",
     "no_period",
     "bent",
-    # The equation of motion takes too long, leaves more than noise, has no minimum, or its best law drives or stops.
-    "too_long",
+    # The equation of motion leaves more than noise, has no minimum, or its best law drives or stops.
     "misfit",
     "no_minimum",
     "driven",

@@ -11,8 +11,6 @@ Examples
 0.758516(22) s
 """
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:

@@ -1,7 +1,5 @@
 """The program: it calls a command, reports an error as one line on stderr, and returns the exit code."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import os

@@ -12,8 +12,6 @@
 ====  ================================================================
 """
 
-from __future__ import annotations
-
 import contextlib
 import logging
 import sys

@@ -5,8 +5,6 @@ wheel alike. Import them from here; the modules that define them may move. :mod:
 add.
 """
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING
 
 from acquisition.block import Block, Flag, SourceInfo

@@ -1,7 +1,5 @@
 """Locations of the program's parts: next to ``springmass`` in a checkout, inside it when installed from a wheel."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 STDIN = "<stdin>"

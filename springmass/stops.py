@@ -1,7 +1,5 @@
 """Requests to end the work: Ctrl-C, SIGTERM, a closed terminal, the page of a recording."""
 
-from __future__ import annotations
-
 import contextlib
 import enum
 import os

@@ -4,8 +4,6 @@ Records are simulated from one motion, clean and spoilt in ways that benches kno
 The integrators solve the equation of the same motion.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Iterator

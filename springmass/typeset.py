@@ -1,7 +1,5 @@
 """How numbers, units and the standing of a law are written: on a page, in a table and in LaTeX."""
 
-from __future__ import annotations
-
 import math
 import re
 import unicodedata
@@ -51,7 +49,6 @@ _UNITS = {
 _RAISED = dict(zip("-0123456789n", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ", strict=True))
 _SUPERSCRIPT = str.maketrans(_RAISED)
 _POWER = re.compile(r"\^(?:\(([\dn-]+)\)|([\dn-]+))")
-NOTHING = "-"
 MANY_FREEDOM = 1e6  # degrees of freedom from which they are written as infinite
 
 

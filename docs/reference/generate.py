@@ -89,9 +89,9 @@ GONE = """\
 ## Codes that are gone
 
 Version 0.2.0 replaced these codes. They named causes that no recording showed, or that the user could do nothing about.
+`halves_differ`, which it replaced too, is back since 0.4.0.
 
 - `correlated_residuals`: `model_misfit`, `values.rms_m` and `values.noise_m`.
-- `halves_differ`: `model_misfit`, `values.halves`.
 - `amplitude_modulated`: `model_misfit`.
 - `rows_lost`, `rows_doubled`: `model_misfit`, or `phase_jump` if many rows in succession are missing.
 - `interleaved_records`, `mains_hum`: `model_misfit`, or `no_oscillation`.

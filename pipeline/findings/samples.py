@@ -116,9 +116,10 @@ def part_findings(partition: Partition | None, first_s: float, last_s: float) ->
         if span.kind is SpanKind.WAITING:
             yield Notice("at_rest", {"seconds": span.last_s - span.first_s, "trigger_s": span.last_s})
     if still:
-        ends = {"first_s": still[0].first_s, "last_s": still[0].last_s}
+        # Windows reach beyond the first and the last sample by half the distance of two samples.
+        ends = {"still_from_s": max(still[0].first_s, first_s), "still_to_s": min(still[0].last_s, last_s)}
         all_of_them = _listed(still) if len(still) > 1 else None
-        yield Notice("at_rest", {"seconds": _seconds(still), **ends, "left_out": all_of_them})
+        yield Notice("at_rest", {"seconds": _seconds(still), **ends, "still": all_of_them, **analysed})
 
 
 def _seconds(spans: Sequence[Span]) -> float:

@@ -6,7 +6,6 @@ admitted, with the source of its limit, and then gives a fit or a refusal. The l
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
@@ -33,10 +32,6 @@ from pipeline.windows.demodulate import Windows
 from pipeline.windows.rounding import rounded
 
 Motion = Oscillation | Relaxation | TwoModes | Rest
-
-# Maximum number of periods for the fit of a weakly damped motion that stops within the record; measured: 216 periods,
-# 17,000 samples, take 0.2 s, and one of 16,500 samples that is refused takes 0.7 s.
-LONGEST_SOLVED = 250
 
 
 class Cyclic(NamedTuple):
@@ -102,9 +97,6 @@ def _by_equation(known: Evidence) -> Oscillation | Refusal | None:
     ends = best.amplitude(np.array([float(np.max(windows.t)) - laws.t0]))[0] <= 0.0
     if not (known.part.stopped or ratio > LEAST_DAMPING or (not exact and (ratio > NOTICEABLE or ends))):
         return None
-    periods = windows.angular_frequency / (2.0 * math.pi) * float(np.ptp(windows.t))
-    if ratio <= NOTICEABLE and periods > LONGEST_SOLVED:
-        return Refusal("too_long", {"periods": periods, "most_periods": LONGEST_SOLVED})
     return fit_equation(known.part.samples, windows, laws)
 
 

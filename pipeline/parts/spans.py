@@ -301,10 +301,13 @@ def _released(series: _Series) -> Partition | None:
     if not small.size or series.t.size - most < FEWEST_FOR_LINE:
         return None
     # The next window may contain the release.
-    first = int(small[-1]) + 2
-    begin_s, first_s = float(series.t[0]) - 0.5 * series.spacing, float(series.t[first]) - 0.5 * series.spacing
-    kind = SpanKind.AT_REST if np.max(series.size[small]) < NEGLIGIBLE * series.size[most] else SpanKind.HANDLED
-    return Partition(first_s, math.inf, (Span(kind, begin_s, first_s),))
+    first, half = int(small[-1]) + 2, 0.5 * series.spacing
+    begin_s, first_s = float(series.t[0]) - half, float(series.t[first]) - half
+    if np.max(series.size[small]) < NEGLIGIBLE * series.size[most]:
+        span = Span(SpanKind.AT_REST, begin_s, float(series.t[small[-1]]) + half)
+    else:
+        span = Span(SpanKind.HANDLED, begin_s, first_s)
+    return Partition(first_s, math.inf, (span,))
 
 
 def _faded(series: _Series, moving: int) -> Partition | None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 from springmass.api.analysing import AnalysisKeywords, AnyScene
 from springmass.api.questions import for_python
-from springmass.course.results_csv import NUMERIC_COLUMNS, WHOLE, columns_of, read_rows
+from springmass.course.results_csv import NUMERIC_COLUMNS, WHOLE, columns_of, read_results
 from springmass.course.worker import row_of
 from springmass.loading.options import AnalysisOptions
 from springmass.loading.scenes import scene_from
@@ -93,7 +93,7 @@ def results(folder: str | os.PathLike[str]) -> pd.DataFrame:
     springmass.Error
         If the folder contains no course, or its table is damaged.
     """
-    return _frame(*read_rows(folder))
+    return _frame(*read_results(folder))
 
 
 def _frame(rows: Sequence[dict[str, Any]], tags: Sequence[str]) -> pd.DataFrame:

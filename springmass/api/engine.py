@@ -1,7 +1,5 @@
 """Every recording in xarray: ``xr.open_dataset("position.txt", engine="springmass")``."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable
 from typing import Any

@@ -1,7 +1,5 @@
 """Word the answer to a reader's question as a Python call."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from acquisition.recordings.questions import Question

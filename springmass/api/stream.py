@@ -1,7 +1,5 @@
 """Estimates while samples arrive."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

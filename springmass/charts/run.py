@@ -1,4 +1,4 @@
-"""The charts of one run: position, amplitude, frequency, spectrum, drag, energy, motion, phase plot, classic method."""
+"""The charts of one run: motion, amplitude, frequency, spectrum, drag, energy, phase plot, contour, classic method."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.analyse import Analysis, Oscillation, Relaxation
-from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.levels import COVERAGE
 from pipeline.numerics.regression import scatter
 from pipeline.results.classic import CYCLES, Classic
-from pipeline.results.curves import Curve, Smoothed
+from pipeline.results.curves import Curve
 from pipeline.track import F8, UNUSABLE, Quality, Track
 from pipeline.units import RECORDED_UNITS, noun
 from springmass.charts.chart import (
@@ -73,8 +72,8 @@ def position(a: Analysis, notes: Sequence[ChartNote] = ()) -> Chart:
     noise, motion = a.estimates["noise"], a.motion
     sigma = pretty(Estimate(factor * noise.value, factor * noise.u, RECORDED_UNITS[track.unit].unit))
     if isinstance(motion, Relaxation):
-        grid, curve = _relaxing(a, motion)
-        series.insert(0, line_of("fit", grid, curve * factor))
+        grid = np.linspace(motion.start_s, float(np.nanmax(track.t)), 600)
+        series.insert(0, line_of("fit", grid, motion.position(grid) * factor))
     if not isinstance(motion, Oscillation):
         caption = f"The recording. Samples scatter by {sigma}."
         return Chart("position", "Position", caption, (Panel(value_label(what, track.unit), tuple(series)),))
@@ -138,12 +137,6 @@ def model_motion(motion: Oscillation, t: F8) -> tuple[F8, F8]:
     cosine, sine = np.cos(angle), np.sin(angle)
     velocity = law.law.rate(amplitude, law.joint.values) * cosine - amplitude * motion.phase.rate(amplitude, t) * sine
     return amplitude * cosine, velocity
-
-
-def _relaxing(a: Analysis, motion: Relaxation) -> tuple[F8, F8]:
-    """Return times and values of a relaxation."""
-    grid = np.linspace(motion.start_s, float(np.nanmax(a.track.t)), 600)
-    return grid, motion.position(grid)
 
 
 def _rest(a: Analysis, motion: Oscillation, factor: float) -> Panel:
@@ -309,12 +302,14 @@ def energy(a: Analysis) -> Chart | None:
     return Chart("energy", "Energy", caption, (above, below))
 
 
-def motion(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
+def motion(a: Analysis) -> Chart | None:
     """Velocity and acceleration, and the difference of the velocity from the fitted law in its band of u."""
-    smoothed, unit = smoothed or _smoothed(a), a.track.unit
-    if smoothed is None or (fit := a.oscillation) is None or unit not in ("m", "rad"):
+    smoothed, fit, unit = a.smoothed, a.oscillation, a.track.unit
+    if smoothed is None or fit is None or unit not in ("m", "rad"):
         return None
     rows = np.flatnonzero(np.isfinite(smoothed.position))
+    if not rows.size:
+        return None
     rows = rows[np.argsort(smoothed.t[rows], kind="stable")]
     rows = rows[:: max(1, round(a.track.rate_hz / fit.windows.cycles.frequency_hz / PER_PERIOD))]
     t, velocity, u = smoothed.t[rows], smoothed.velocity[rows], smoothed.u_velocity[rows]
@@ -422,15 +417,6 @@ def classic_method(a: Analysis, classic: Classic) -> Chart | None:
     return Chart("classic", "The lab report's method", caption, (above, below))
 
 
-def _smoothed(a: Analysis) -> Smoothed | None:
-    """Return the motion at every sample, or None if the recording does not allow it."""
-    try:
-        smoothed = a.smoothed()
-    except AnalysisError:
-        return None
-    return smoothed if np.isfinite(smoothed.position).any() else None
-
-
 CHARTS: Mapping[str, Callable[[Analysis], Chart | None]] = {
     "position": position,
     "amplitude": amplitude,
@@ -446,22 +432,13 @@ CHARTS: Mapping[str, Callable[[Analysis], Chart | None]] = {
 
 
 def charts_of(
-    a: Analysis,
-    notes: Sequence[ChartNote] = (),
-    classic: Classic | None = None,
-    smoothed: Smoothed | None = None,
-    *,
-    profiles: bool = False,
+    a: Analysis, notes: Sequence[ChartNote] = (), classic: Classic | None = None, *, profiles: bool = False
 ) -> dict[str, Chart]:
     """Return all charts that a run allows, in the report's order; only the position if nothing oscillates.
 
     ``profiles`` asks for the contour too, which may take as long as the analysis.
     """
-    makers: dict[str, Callable[[Analysis], Chart | None]] = {
-        **CHARTS,
-        "position": partial(position, notes=notes),
-        "motion": partial(motion, smoothed=smoothed),
-    }
+    makers: dict[str, Callable[[Analysis], Chart | None]] = {**CHARTS, "position": partial(position, notes=notes)}
     charts = {name: make(a) for name, make in makers.items() if profiles or name != "contour"}
     if classic is not None:
         charts["classic"] = classic_method(a, classic)

@@ -1,4 +1,4 @@
-"""Charts of several runs: positions over one another, spring constants side by side, a course and its drag."""
+"""Charts of several runs: positions, spring constants, masses, Hooke's law, a course and the drag of its discs."""
 
 from __future__ import annotations
 
@@ -54,11 +54,7 @@ def comparison(compared: Comparison) -> Chart:
     if exchanged.any():
         series.append(Series("perhaps exchanged", x[exchanged], k[exchanged], "flagged", u=u[exchanged]))
     if compared.agree:  # constants that disagree have no meaningful mean
-        mean, ends = compared.spring_constant, np.array([0.5, len(names) + 0.5])
-        series[:0] = [
-            band_of("mean ± u", ends, np.full(2, mean.value), np.full(2, mean.u)),
-            line_of("mean", ends, np.full(2, mean.value)),
-        ]
+        series[:0] = _mean(compared.spring_constant, len(names))
     low, high = float(np.min(k - u)), float(np.max(k + u))
     margin = 0.1 * (high - low) or 1.0
     panels = (
@@ -70,6 +66,12 @@ def comparison(compared: Comparison) -> Chart:
         "common to all runs (clock, mass of the spring) cancel."
     )
     return Chart("comparison", "Comparison", caption, panels)
+
+
+def _mean(mean: Estimate, places: int) -> list[Series]:
+    """Return a mean with its u across all places of an axis of names."""
+    ends, value = np.array([0.5, places + 0.5]), np.full(2, mean.value)
+    return [band_of("mean ± u", ends, value, np.full(2, mean.u)), line_of("mean", ends, value)]
 
 
 def masses(line: MassLine) -> Chart:
@@ -138,11 +140,7 @@ def course(
     names = tuple(row.run for row in ordered if row.run not in differing)
     series = [Series("value ± u", at[good], values[good], u=us[good], why=names)]
     if mean is not None:
-        ends = np.array([0.5, len(groups) + 0.5])
-        series[:0] = [
-            band_of("mean ± u", ends, np.full(2, mean.value), np.full(2, mean.u)),
-            line_of("mean", ends, np.full(2, mean.value)),
-        ]
+        series[:0] = _mean(mean, len(groups))
     if apart.any():
         series.append(Series("differs from its course", at[apart], values[apart], "flagged", u=us[apart], why=why))
     panel = Panel(label, tuple(series), x_label=x_label, names=tuple(groups))

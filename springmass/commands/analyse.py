@@ -88,16 +88,15 @@ def analyse(
     given: GivenOptions,
 ) -> int:
     """Analyse every input; if one fails, the others still give results."""
-    inputs = [str(each) for each in recordings]
     own = {name: getattr(options, name) for name in ("from_s", "to_s", "clock_ppm", "method")}
     how = analysis.of(read, **own)
-    if options.keep and (not read.about_the_file().given() or STDIN in inputs):
+    if options.keep and (not read.about_the_file().given() or STDIN in recordings):
         raise ProgramError("--keep keeps options of reading such as --unit next to a file", "give one, and the file")
-    if how.velocity is not None and (len(inputs) > 1 or Path(inputs[0]).is_dir()):
-        got = f"{len(inputs)} inputs" if len(inputs) > 1 else "a folder"
+    if how.velocity is not None and (len(recordings) > 1 or Path(recordings[0]).is_dir()):
+        got = f"{len(recordings)} inputs" if len(recordings) > 1 else "a folder"
         raise ProgramError(f"--velocity completes one position file, got {got}", "analyse the pair by itself")
-    scenes, values = read_scenes(options.scene, len(inputs)), bench.values()
-    files, folders = files_of(inputs)
+    scenes, values = read_scenes(options.scene, len(recordings)), bench.values()
+    files, folders = files_of(recordings)
     for line in folders:
         LOG.info(line)
     alone = len(files) == 1
@@ -114,7 +113,7 @@ def analyse(
         given.refuse("on JSON", "--full", "--si")
     if not alone:
         given.refuse("on several inputs", "--template", "--full")
-    runs, codes = _analysed(tasks, options, typed=inputs == [files[0].path])
+    runs, codes = _analysed(tasks, options, typed=recordings == (files[0].path,))
     if runs and not options.json:
         _print_text(runs[0], options) if alone else _print_together(runs, options)
     written = OK
@@ -124,7 +123,7 @@ def analyse(
     _keep(runs, read, options)
     codes += [_judged(run, options) for run in runs]
     if len(runs) > 1:
-        named = shlex.join(inputs)
+        named = shlex.join(recordings)
         LOG.log(HINT, f"springmass compare {named if len(named) <= LONGEST_INPUTS else '...'}")
     code = of_several(codes)
     return code if code == SOME_FAILED else max(code, written)

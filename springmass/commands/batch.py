@@ -1,20 +1,15 @@
 """``springmass batch``: a course of runs to one table, a page and reports, resumable, here or on a cluster."""
 
-from __future__ import annotations
-
 import json
 import sys
-from dataclasses import dataclass
 from typing import Annotated
-
-from cyclopts import Parameter
 
 from springmass.commands.given import GivenOptions
 from springmass.commands.options import AnalysisArguments, FileArgument, ReadPairs
 from springmass.commands.parameters import PositiveCount, WholeNumber, argument, flag, option, output
 from springmass.commands.questions import for_course
 from springmass.course.page import COURSE_PAGE, GROUPS_FILE
-from springmass.course.plan import plan, template
+from springmass.course.plan import empty_table, plan
 from springmass.course.results_csv import CSV, FAILED
 from springmass.course.running import run_course
 from springmass.course.store import DATABASE, opened
@@ -24,29 +19,21 @@ from springmass.terminal.printing import visible_lines
 from springmass.typeset import count
 
 
-@Parameter(name="*")
-@dataclass(frozen=True, kw_only=True)
-class BatchOptions:
-    """The options of ``springmass batch``."""
-
-    output: Annotated[
-        FileArgument | None, output("DIR", "folder for table, page and reports; an existing course is continued")
-    ] = None
-    runs: Annotated[FileArgument | None, option("FILE", "CSV table with what you know about each run")] = None
-    template: Annotated[bool, flag("print an empty table for --runs to fill in")] = False
-    scene: Annotated[
-        FileArgument | None, option("FILE", "scene file for all runs; values in the table take precedence")
-    ] = None
-    jobs: Annotated[PositiveCount | None, option("N", "number of processes (default: one per core)")] = None
-    dask: Annotated[str | None, option("ADDRESS", "analyse on the workers of this dask scheduler")] = None
-    reports: Annotated[
-        WholeNumber, option("N", "write full reports of the N runs that most need a look (default: 20)")
-    ] = 20
-
-
 def batch(
     *recordings: Annotated[FileArgument, argument("INPUT", "recordings, folders (with subfolders), or patterns")],
-    options: BatchOptions = BatchOptions(),
+    output: Annotated[
+        FileArgument | None, output("DIR", "folder for table, page and reports; an existing course is continued")
+    ] = None,
+    runs: Annotated[FileArgument | None, option("FILE", "CSV table with what you know about each run")] = None,
+    template: Annotated[bool, flag("print an empty table for --runs to fill in")] = False,
+    scene: Annotated[
+        FileArgument | None, option("FILE", "scene file for all runs; values in the table take precedence")
+    ] = None,
+    jobs: Annotated[PositiveCount | None, option("N", "number of processes (default: one per core)")] = None,
+    dask: Annotated[str | None, option("ADDRESS", "analyse on the workers of this dask scheduler")] = None,
+    reports: Annotated[
+        WholeNumber, option("N", "write full reports of the N runs that most need a look (default: 20)")
+    ] = 20,
     reading: ReadPairs = ReadPairs(),
     analysis: AnalysisArguments = AnalysisArguments(),
     given: GivenOptions,
@@ -54,25 +41,24 @@ def batch(
     """Analyse new and changed runs, and write the table and the page of all runs."""
     reading.refuse("on a course, whose pairs are found by their names", "velocity")
     how = analysis.of(reading.options)
-    inputs = [str(each) for each in recordings]
-    if not inputs and options.runs is None:
+    if not recordings and runs is None:
         raise ProgramError("batch needs recordings, folders or --runs FILE, got none of them")
-    if options.template:
+    if template:
         given.only("with --template", "--template")
-        table = template([task.name for task in plan(inputs).tasks])
+        table = empty_table([task.name for task in plan(recordings).tasks])
         # A file gets the paths unchanged, because they are read back from it.
         print(visible_lines(table) if sys.stdout.isatty() else table.removesuffix("\n"))
         return OK
-    if options.output is None:
+    if output is None:
         raise ProgramError("batch needs a folder for the results", "name it with -o DIR")
-    if options.dask is not None and options.jobs:
-        raise ProgramError("--dask brings its workers, got --jobs too", "leave out --jobs")
-    folder = make_folder(options.output)
+    if dask is not None:
+        given.refuse("with --dask, which brings its own workers", "--jobs")
+    folder = make_folder(output)
     with opened(folder) as store:
         course = plan(
-            inputs,
-            runs_csv=None if options.runs is None else str(options.runs),
-            scene=None if options.scene is None else str(options.scene),
+            recordings,
+            runs_csv=runs,
+            scene=scene,
             how=how,
             known_paths=[json.loads(key)[0] for key in store.made_of()],
             output=str(folder),
@@ -80,7 +66,7 @@ def batch(
         for line in course.notes:
             LOG.info(line)
         rows, made, unwritten = run_course(
-            course, store, folder, jobs=options.jobs, dask=options.dask, reports=options.reports, remedy=for_course
+            course, store, folder, jobs=jobs, dask=dask, reports=reports, remedy=for_course
         )
     for line in unwritten:
         LOG.warning(line)

@@ -7,10 +7,7 @@ import math
 import shlex
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal
-
-from cyclopts import Parameter
 
 from acquisition.errors import visible
 from pipeline.findings.finding import kinds
@@ -26,48 +23,40 @@ from springmass.commands.options import (
 )
 from springmass.commands.parameters import Share, argument, option, output
 from springmass.comparing.comparison import SpringComparison, compare_runs, comparison_json, comparison_words
-from springmass.course.results_csv import COURSE, is_course, read_rows
+from springmass.course.results_csv import COURSE, is_course, read_results
 from springmass.errors import HINT, LOG, OK, REJECTED, ProgramError
 from springmass.loading.save import now_utc
 from springmass.loading.scenes import read_scenes
 from springmass.result.output_names import distinct_names, make_folder
 from springmass.result.run_json import RESULT_SCHEMA, plain, provenance_of, rejected
 from springmass.runs.run import Run
-from springmass.runs.tasks import Task, analysed, law_lines
+from springmass.runs.tasks import Task, analysed_runs, law_lines
 from springmass.typeset import count
 
 if TYPE_CHECKING:
     from springmass.course.benches import CourseComparison
 
 
-@Parameter(name="*")
-@dataclass(frozen=True, kw_only=True)
-class CompareOptions:
-    """The options of ``springmass compare``."""
-
-    scene: Scenes = ()
-    mass_correlation: Annotated[
-        Share, option("R", "correlation between the errors of two bobs' masses (default: 0)")
-    ] = 0.0
-    reported: Annotated[
-        FileArgument | None, option("FILE", "table of printed values to judge: columns run, name, value, u, unit")
-    ] = None
-    hooke: Annotated[
-        FileArgument | None,
-        option("FILE", "table of masses or forces and positions: k by Hooke's law beside that of the runs"),
-    ] = None
-    output: Annotated[FileArgument | None, output("DIR", "folder for a report (default: write no report)")] = None
-    figures: FiguresOption = ()
-    template: Annotated[Literal["latex"] | None, option("KIND", "also write a lab report template: latex")] = None
-    json: Json = False
-    strict: Strict = False
-
-
 def compare(
     *recordings: Annotated[
         FileArgument, argument("RUN", "two or more runs of one spring, or folders from batch", required=True)
     ],
-    options: CompareOptions = CompareOptions(),
+    scene: Scenes = (),
+    mass_correlation: Annotated[
+        Share, option("R", "correlation between the errors of two bobs' masses (default: 0)")
+    ] = 0.0,
+    reported: Annotated[
+        FileArgument | None, option("FILE", "table of printed values to judge: columns run, name, value, u, unit")
+    ] = None,
+    hooke: Annotated[
+        FileArgument | None,
+        option("FILE", "table of masses or forces and positions: k by Hooke's law beside that of the runs"),
+    ] = None,
+    output: Annotated[FileArgument | None, output("DIR", "folder for a report (default: write no report)")] = None,
+    figures: FiguresOption = (),
+    template: Annotated[Literal["latex"] | None, option("KIND", "also write a lab report template: latex")] = None,
+    as_json: Json = False,
+    strict: Strict = False,
     reading: ReadPairs = ReadPairs(),
     analysis: AnalysisArguments = AnalysisArguments(),
     given: GivenOptions,
@@ -75,27 +64,24 @@ def compare(
     """Analyse every run, compare them, and print or write the result; for courses use the existing results."""
     reading.refuse("on several runs", "velocity")
     how = analysis.of(reading.options)
-    inputs = [str(each) for each in recordings]
-    if all(is_course(path) for path in inputs):
+    if all(is_course(path) for path in recordings):
         given.only("on courses, which are analysed already", "--json", "--strict")
-        return _run_courses(inputs, options)
-    if len(inputs) < 2:
+        return _run_courses(recordings, as_json=as_json, strict=strict)
+    if len(recordings) < 2:
         raise ProgramError(
-            f"compare needs two runs at least, got {len(inputs)}", "springmass analyse takes a single one"
+            f"compare needs two runs at least, got {len(recordings)}", "springmass analyse takes a single one"
         )
-    if options.output is None:
+    if output is None:
         given.refuse("without -o", "--figures", "--template")
     # Scenes are read first, so that their errors are found before an hour of recordings is read.
-    scenes = read_scenes(options.scene, len(inputs))
-    out = None if options.output is None else make_folder(options.output)
-    each = zip(inputs, distinct_names(inputs), scenes, strict=True)
-    runs = analysed(Task(path, name, scene, how) for path, name, scene in each)
-    compared = compare_runs(
-        runs, mass_correlation=options.mass_correlation, reported=options.reported, static=options.hooke
-    )
-    parameters = {**how.parameters, "mass_correlation": options.mass_correlation}
+    scenes = read_scenes(scene, len(recordings))
+    out = None if output is None else make_folder(output)
+    each = zip(recordings, distinct_names(recordings), scenes, strict=True)
+    runs = analysed_runs(Task(path, name, of_run, how) for path, name, of_run in each)
+    compared = compare_runs(runs, mass_correlation=mass_correlation, reported=reported, static=hooke)
+    parameters = {**how.parameters, "mass_correlation": mass_correlation}
     result = comparison_json(compared, provenance_of(how.accuracy, parameters, now_utc()))
-    if options.json:
+    if as_json:
         print(json.dumps(result, allow_nan=False), flush=True)
     else:
         _print_text(compared, runs)
@@ -108,8 +94,8 @@ def compare(
             runs,
             compared=compared,
             summary=result,
-            figures=options.figures,
-            template=options.template,
+            figures=figures,
+            template=template,
             counting=counted_figures,
         )
         LOG.info(f"report: {page}")
@@ -117,25 +103,25 @@ def compare(
     else:
         LOG.log(HINT, "the same command with -o DIR writes the report")
     findings = [*result["findings"], *(f for run in runs for f in run.result["findings"])]
-    if options.strict and (wrong := rejected(findings)):
+    if strict and (wrong := rejected(findings)):
         LOG.warning(f"rejected under --strict: {', '.join(wrong)}")
         return REJECTED
     return OK
 
 
-def _run_courses(inputs: Sequence[str], options: CompareOptions) -> int:
+def _run_courses(folders: Sequence[str], *, as_json: bool, strict: bool) -> int:
     from springmass.course.benches import compare_rows
     from springmass.terminal.printing import visible_lines
 
-    rows = [{**row, COURSE: visible(folder)} for folder in inputs for row in read_rows(folder)[0]]
+    rows = [{**row, COURSE: visible(folder)} for folder in folders for row in read_results(folder)[0]]
     compared = compare_rows(rows)
     print(
         json.dumps({"schema": RESULT_SCHEMA, **plain(compared)}, allow_nan=False)
-        if options.json
+        if as_json
         else visible_lines(_course_text(compared))
     )
     wrong = {group.name for group in compared.suspects}.union(*(group.names for group in compared.disagreements))
-    if options.strict and wrong:
+    if strict and wrong:
         LOG.warning(f"rejected under --strict: {len(wrong)} runs differ from their course or bench")
         return REJECTED
     for suspect in compared.suspects[:1]:

@@ -1,7 +1,5 @@
 """``springmass convert``: a recording into a run file or another program's form, or the original out of a run."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Sequence
 from pathlib import Path, PurePath

@@ -1,13 +1,9 @@
 """``springmass demo``: the main job on the bundled recordings, from their files to Table 1."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Annotated
 
-from acquisition.clock import VirtualClock
-from acquisition.replay import Replay
 from springmass.commands.options import FileArgument
 from springmass.commands.parameters import output
 from springmass.comparing.comparison import compare_runs
@@ -19,7 +15,7 @@ from springmass.loading.scenes import read_scene
 from springmass.report.write import write_report
 from springmass.result.output_names import make_folder
 from springmass.runs.run import Run
-from springmass.runs.tasks import Task, analysed
+from springmass.runs.tasks import Task, analysed_runs
 from springmass.terminal.printing import findings_text, text_table
 from springmass.terminal.style import style_of
 
@@ -29,7 +25,7 @@ BUNDLED_RUNS = ("undamped", "damped")
 def demo(
     *, output: Annotated[FileArgument, output("DIR", "output folder (default: springmass-demo)")] = "springmass-demo"
 ) -> int:
-    """Replay both recordings into run files, analyse and compare them, print Table 1, write the report."""
+    """Convert both recordings to run files, analyse and compare them, print Table 1, write the report."""
     out = make_folder(output)
     runs = [_one(name, out) for name in BUNDLED_RUNS]
     compared = compare_runs(runs)
@@ -47,13 +43,11 @@ def demo(
 
 
 def _one(name: str, out: Path) -> Run:
-    """Replay the old files into a run file, and analyse that run file."""
+    """Convert the old files to a run file, and analyse that run file."""
     data = sample_data()
     velocity = data / f"{name}_simulated_velocity.txt"
     old = load(data / f"{name}_simulated_position.txt", LoadOptions(velocity=velocity))
-    scene = read_scene(data / f"{name}.scene.toml")
-    path = out / f"{name}.h5"
-    with Replay(old.samples, VirtualClock(), info=old.info, speed=None) as source:
-        save_run(path, old, blocks=source, scene=scene.to_mapping(), overwrite=True)
-    (run,) = analysed([Task(str(path), name)])
+    scene = read_scene(data / f"{name}.scene.toml").to_mapping()
+    path = save_run(out / f"{name}.h5", old, scene=scene, overwrite=True)
+    (run,) = analysed_runs([Task(str(path), name)])
     return run

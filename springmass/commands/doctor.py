@@ -1,7 +1,5 @@
 """``springmass doctor``: check the installation for problems that have broken such programs before."""
 
-from __future__ import annotations
-
 import importlib
 import importlib.metadata
 import importlib.util

@@ -1,9 +1,6 @@
 """``springmass explain``: what a finding means, what causes it, what to do, and an example."""
 
-from __future__ import annotations
-
 import json
-from collections.abc import Mapping
 from difflib import get_close_matches
 from typing import Annotated
 
@@ -36,7 +33,10 @@ def explain(
     elif codes:
         print("\n\n".join(_explained(code, all_kinds[code]) for code in codes))
     else:
-        print(_listed(all_kinds))
+        groups: dict[str, list[str]] = {}
+        for code, kind in all_kinds.items():
+            groups.setdefault(kind.symptom, []).append(wrapped(f"  {code}: {kind.meaning}", " " * 6, PAGE_WIDTH))
+        print("\n\n".join("\n".join([symptom, *lines]) for symptom, lines in groups.items()))
     return OK
 
 
@@ -67,10 +67,3 @@ def _explained(code: str, kind: FindingKind) -> str:
     return "\n".join(
         [*lines, *(wrapped(f"{name + ':':<9}{text}", EXPLANATION_INDENT, PAGE_WIDTH) for name, text in rows)]
     )
-
-
-def _listed(all_kinds: Mapping[str, FindingKind]) -> str:
-    groups: dict[str, list[str]] = {}
-    for code, kind in all_kinds.items():
-        groups.setdefault(kind.symptom, []).append(wrapped(f"  {code}: {kind.meaning}", " " * 6, PAGE_WIDTH))
-    return "\n\n".join("\n".join([symptom, *lines]) for symptom, lines in groups.items())

@@ -1,7 +1,5 @@
 """``springmass firmware``: wiring and settings of the rangefinder that this project builds, and how to flash it."""
 
-from __future__ import annotations
-
 import contextlib
 import shlex
 from typing import Annotated

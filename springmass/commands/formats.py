@@ -1,7 +1,5 @@
 """``springmass formats``: the families of recordings, or what one file is."""
 
-from __future__ import annotations
-
 import json
 import shlex
 from collections.abc import Iterator
@@ -56,7 +54,7 @@ def formats(
     for line in _lines(facts):
         print(visible(line))
     if "needs" not in facts:
-        LOG.log(HINT, f"springmass analyse {shlex.quote(str(file))}")
+        LOG.log(HINT, f"springmass analyse {shlex.quote(file)}")
     return OK
 
 

@@ -18,8 +18,10 @@ from springmass.loading.options import LOAD_FIELDS, Accuracy, AnalysisOptions, L
 if TYPE_CHECKING:
     from pipeline.numerics.estimate import Estimate
 
-FileArgument = str | Path
-"""The name of a file; a shell completes it."""
+    FileArgument = str
+else:
+    FileArgument = str | Path  # as it is typed; a shell completes the name of a file where a path is allowed
+
 HOW_READ = Group("How the recording is read", sort_key=2)
 THE_PAGE = Group("The page", sort_key=4)
 FURTHER_OPTIONS = Parameter(group=Group("Further options", sort_key=4))

@@ -1,7 +1,5 @@
 """``springmass page``: the window, to which recordings are dropped; or one recording, as it happens or as it was."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import logging
@@ -10,11 +8,8 @@ import sys
 import threading
 import webbrowser
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
-
-from cyclopts import Parameter
 
 from springmass.commands.given import Given, GivenOptions
 from springmass.commands.options import FileArgument, PageOptions, ReadPairs
@@ -30,28 +25,20 @@ from springmass.page.web.server import address_in_network, code_for_terminal, se
 from springmass.stops import STOPS
 
 
-@Parameter(name="*")
-@dataclass(frozen=True, kw_only=True)
-class WindowOptions:
-    """What the page is, if it is not the window with the recordings."""
-
-    play: Annotated[bool, flag("play one recording back, with cursors and selections, instead of the window")] = False
-    shortcut: Annotated[bool, flag("make an icon that opens the window, and say where it is")] = False
-
-
 def page(
     *recordings: Annotated[
         FileArgument, argument("INPUT", "recordings or folders to open in the window; or a wire log")
     ],
-    options: WindowOptions = WindowOptions(),
+    play: Annotated[bool, flag("play one recording back, with cursors and selections, instead of the window")] = False,
+    shortcut: Annotated[bool, flag("make an icon that opens the window, and say where it is")] = False,
     page: PageOptions = PageOptions(),
     reading: ReadPairs = ReadPairs(),
     given: GivenOptions,
 ) -> int:
     """Open the window, with recordings; or show one: a growing wire log, with --play, or to others with --lan."""
     recorder = os.environ.pop(OF_RECORDER, None) is not None
-    shown = recorder or options.play or page.lan or any(kind_of(each) == "wire" for each in recordings)
-    if options.shortcut:
+    shown = recorder or play or page.lan or any(kind_of(each) == "wire" for each in recordings)
+    if shortcut:
         given.only("with an icon, which opens the window", "--shortcut")
         if recordings:
             raise ProgramError("--shortcut makes an icon for the window without a recording", "leave the recording out")

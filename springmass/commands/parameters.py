@@ -1,7 +1,5 @@
 """How the parameters of commands are declared, and their numeric types, whose ranges the command line demands."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from typing import Annotated, Any

@@ -1,7 +1,5 @@
 """``springmass ports``: the serial ports of this machine, what speaks on them, and the sensors that can be recorded."""
 
-from __future__ import annotations
-
 import json
 import shlex
 from typing import Annotated, Any

@@ -1,7 +1,5 @@
 """Word the answer to a reader's question as options of the command line, quoted for a shell."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections.abc import Mapping, Sequence

@@ -351,10 +351,9 @@ class _Bench:
     def _rest(self, seconds: float) -> StillPoint:
         """Measure the rest position, at the distances by the ruler first, which set offset and scale."""
         ruler = self.options.ruler
-        if not ruler:
-            return self._still(seconds, "let the bob hang still")
-        if len(ruler) == 1:
-            return self.session.calibrate([self._still(seconds, "let the bob hang still")], ruler)
+        if len(ruler) < 2:
+            rest = self._still(seconds, "let the bob hang still")
+            return self.session.calibrate([rest], ruler) if ruler else rest
         points = []
         for distance_m in ruler:
             self._ask(f"bring the target to {distance_m:g} m by the ruler, then press Enter")
@@ -418,7 +417,7 @@ def _virtual(options: RecordOptions, family: Sensor, scene: Scene | None, releas
         got = ", ".join(f"{each:g}" for each in options.ruler)
         raise ProgramError(f"--ruler {got}: the simulated bob hangs at {REST_M:g} m", "name one --ruler near that")
     waits = options.still is not None or options.ready
-    where = "the example bench" if options.scene is None else str(options.scene)
+    where = "the example bench" if options.scene is None else options.scene
     seconds = options.seconds or UNLIMITED_S
     position = bench_position(scene, seconds, where=where, release=release if waits else None)
     model = VirtualSensor(rate_hz=options.rate_hz or family.rate_hz)

@@ -1,7 +1,5 @@
 """``springmass recover``: build a run file from any wire log, however damaged."""
 
-from __future__ import annotations
-
 import shlex
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """``springmass replay``: a recording through the interface of a live sensor, on standard output."""
 
-from __future__ import annotations
-
 import math
 import sys
 from typing import Annotated

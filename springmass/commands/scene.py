@@ -1,7 +1,5 @@
 """``springmass scene``: a scene to fill in, a scene checked, and what is noted beside a recording afterwards."""
 
-from __future__ import annotations
-
 import shlex
 from pathlib import Path
 from typing import Annotated
@@ -58,7 +56,7 @@ def scene(
         ask_about(checked, check)
         print(visible(f"{check}: a scene that states {stated_keys(checked)}"))
         todo = f"write what you measured into {check}, and remove the # before it"
-        LOG.log(HINT, todo if checked == Scene() else f"springmass analyse RECORDING --scene {shlex.quote(str(check))}")
+        LOG.log(HINT, todo if checked == Scene() else f"springmass analyse RECORDING --scene {shlex.quote(check)}")
         return OK
     if not recordings:
         if noted:
@@ -68,9 +66,9 @@ def scene(
         return OK
     if not noted:
         remedy = "give --scene, --note, --mark S=TEXT or an option of reading"
-        check = f"springmass scene --check {quoted(str(recordings[0]))}"
+        check = f"springmass scene --check {quoted(recordings[0])}"
         raise ProgramError(f"{recordings[0]}: nothing to save", f"{remedy}, or check a scene: {check}")
-    files, messages = files_of([str(each) for each in recordings])
+    files, messages = files_of(recordings)
     for line in messages:
         LOG.info(line)
     stated = None if scene is None else read_scene(scene)
@@ -97,5 +95,5 @@ def scene(
             LOG.warning(for_one(error, "scene", each.path, answers) if isinstance(error, NeedsAnswer) else error)
             codes.append(error.exit_code if isinstance(error, ProgramError) else UNREADABLE)
     if OK in codes:
-        LOG.log(HINT, f"springmass analyse {' '.join(shlex.quote(str(each)) for each in recordings)}")
+        LOG.log(HINT, f"springmass analyse {shlex.join(recordings)}")
     return of_several(codes)

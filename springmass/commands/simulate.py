@@ -1,7 +1,5 @@
 """``springmass simulate``: the motion that a scene predicts, its uncertainty, and the cost of computing it."""
 
-from __future__ import annotations
-
 import json
 import math
 import shlex
@@ -30,7 +28,7 @@ from springmass.simulations.simulation import (
     beside_measured,
     prediction,
     simulated,
-    summary,
+    simulation_json,
 )
 from springmass.terminal.printing import aligned, wrapped
 
@@ -80,8 +78,9 @@ def simulate(
     where, say = str(against if scene is None else scene), sys.stderr if as_json else sys.stdout
     if run_file is not None and run_file.exists() and not overwrite:
         raise ProgramError(f"{visible(str(run_file))}: exists", "take another name, or --overwrite")
-    stated, run = None if scene is None else read_scene(scene), None
-    if scene is not None and stated is not None:
+    stated = run = None
+    if scene is not None:
+        stated = read_scene(scene)
         ask_about(stated, scene)
     if against is not None:
         run = Run.of(against, stated, AnalysisOptions(**reading.options.given()))
@@ -112,7 +111,7 @@ def simulate(
         of_scene = "" if scene is None else f" --scene {shlex.quote(where)}"
         LOG.log(HINT, f"springmass analyse {shlex.quote(str(run_file or made / 'run.h5'))}{of_scene}")
     if as_json:
-        print(json.dumps(summary(simulation)))
+        print(json.dumps(simulation_json(simulation)))
     return OK
 
 

@@ -1,7 +1,5 @@
 """``springmass trade``: what accuracy costs on this machine, as two tables."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, NotRequired, TypedDict
 
 from pipeline.analyse import Oscillation
-from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError
 from pipeline.findings.finding import Finding, by_severity, word
 from pipeline.notice import Notice
@@ -161,22 +160,19 @@ class SpringComparison:
         return "\n".join([self.comparison.message, *(of_bob.message for of_bob in self.joint)])
 
 
-def demand_one_spring(scenes: Sequence[tuple[str, Scene]]) -> None:
-    """Refuse scenes without a mass of the bob, or of different springs: their spring constants cannot be compared."""
-    missing = [name for name, scene in scenes if scene.bob_mass_kg is None]
+def _demand_one_spring(runs: Sequence[Run]) -> None:
+    """Refuse runs without a mass of the bob, or of different springs: their spring constants cannot be compared."""
+    missing = [run.name for run in runs if run.scene.bob_mass_kg is None]
     if missing:
         raise ProgramError(
             f"compare needs the mass of every run's bob; none is stated for {', '.join(missing)}",
             "give --scene FILE, one for all runs or one for each in their order",
         )
-    first, *others = scenes
-    for name, scene in others:
-        if scene.spring_mass_kg != first[1].spring_mass_kg:
-            raise ProgramError(
-                f"compare takes runs of one spring; [spring] mass_kg is {first[1].spring_mass_kg or 'not given'} for "
-                f"{first[0]} and {scene.spring_mass_kg or 'not given'} for {name}",
-                "state the same in both scenes",
-            )
+    first, *others = (f"{run.scene.spring_mass_kg or 'not given'} for {run.name}" for run in runs)
+    for run, stated in zip(runs[1:], others, strict=True):
+        if run.scene.spring_mass_kg != runs[0].scene.spring_mass_kg:
+            wrong = f"compare takes runs of one spring; [spring] mass_kg is {first} and {stated}"
+            raise ProgramError(wrong, "state the same in both scenes")
 
 
 def compare_runs(
@@ -191,15 +187,14 @@ def compare_runs(
     ``mass_correlation`` is the correlation coefficient between the errors of two bobs' masses, 0 to 1. ``reported``
     is a table of printed values to judge, ``static`` one of masses and positions.
     """
-    demand_one_spring([(run.name, run.scene) for run in runs])
-    motions = [(run.name, _moving(run)) for run in runs]
+    _demand_one_spring(runs)
+    bobs = _of_one_bob(runs)
     springs = [SpringRun.of(run.name, run.analysis.derived, clock=run.analysis.track.clock) for run in runs]
     comparison = compare_springs(
         springs, spring_mass_kg=runs[0].scene.spring_mass_kg, mass_correlation=mass_correlation
     )
     joint = tuple(
-        join([(name, m.damping, float(m.windows.t[-1]) - m.damping.t0) for name, m in group])
-        for group in _of_one_bob(motions, [run.scene for run in runs])
+        join([(name, m.damping, float(m.windows.t[-1]) - m.damping.t0) for name, m in group]) for group in bobs
     )
     judged, mistakes = judge(read_reported(reported, runs), runs) if reported is not None else ((), ())
     findings = by_severity([*_findings(comparison, joint), *mistakes])
@@ -312,21 +307,17 @@ def comparison_json(compared: SpringComparison, provenance: Provenance) -> dict[
     return {key: plain(every[key]) for key in ComparisonResult.__annotations__ if key in every}
 
 
-def _moving(run: Run) -> Oscillation:
-    if (motion := run.analysis.oscillation) is None:
-        raise AnalysisError(f"{run.name}: no oscillation to compare: {run.why}")
-    return motion
-
-
-def _of_one_bob(motions: list[tuple[str, Oscillation]], scenes: list[Scene]) -> list[list[tuple[str, Oscillation]]]:
+def _of_one_bob(runs: Sequence[Run]) -> list[list[tuple[str, Oscillation]]]:
     """Group runs with the same bob, disc and unit, two or more to a group.
 
     The bob must be the same because the damping coefficients are inversely proportional to the mass.
     """
     groups: dict[tuple[Estimate | None, Estimate | None, str], list[tuple[str, Oscillation]]] = {}
-    for (name, motion), scene in zip(motions, scenes, strict=True):
-        bob = (scene.bob_mass_kg, scene.disc_diameter_m, motion.rest.mean.unit)
-        groups.setdefault(bob, []).append((name, motion))
+    for run in runs:
+        if (motion := run.analysis.oscillation) is None:
+            raise AnalysisError(f"{run.name}: no oscillation to compare: {run.why}")
+        bob = (run.scene.bob_mass_kg, run.scene.disc_diameter_m, motion.rest.mean.unit)
+        groups.setdefault(bob, []).append((run.name, motion))
     return [group for group in groups.values() if len(group) > 1]
 
 

@@ -1,7 +1,5 @@
 """Check values that somebody printed about runs against the recordings, and name the mistake that explains them."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Mapping, Sequence

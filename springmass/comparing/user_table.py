@@ -1,7 +1,5 @@
 """Read tables that a user wrote, separated by commas, semicolons or tabs: their rows, and a static measurement."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

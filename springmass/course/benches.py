@@ -1,7 +1,5 @@
 """Compare the runs of a course: springs, discs, scatter within and between benches, and wrongly labelled runs."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections import Counter
@@ -60,27 +58,28 @@ def compare_rows(rows: Sequence[Mapping[str, Any]]) -> CourseComparison:
     named = {suspect.name for suspect in differing}
     named |= {name for bench in disagreements if bench.spread > LITTLE for name in bench.names}
     agreements = []
-    for quantity, label in (("spring_constant", "spring"), ("drag", "disc")):
+    for quantity, label, called in (
+        ("spring_constant", "spring", "spring_constant"),
+        ("drag", "disc", "drag_coefficient"),
+    ):
         groups: dict[str, list[CourseRun]] = {}
         for run in runs:
             if getattr(run, quantity) is not None:
                 groups.setdefault(getattr(run, label), []).append(run)
         for name, group in sorted(groups.items()):
-            agreements.append(_agreement(quantity, name, [run for run in group if run.name not in named]))
+            good = [run for run in group if run.name not in named]
+            agreements.append(
+                _agreement(called, name, [getattr(run, quantity) for run in good], [run.bench for run in good])
+            )
     laws = dict(Counter(sorted(row["law"] for row in moving if row.get("law"))).most_common())
     return CourseComparison(len(runs), by, tuple(agreements), differing, disagreements, laws)
 
 
-_NAMES = {"spring_constant": "spring_constant", "drag": "drag_coefficient"}
-
-
-def _agreement(quantity: str, name: str, group: Sequence[CourseRun]) -> Agreement:
+def _agreement(quantity: str, name: str, values: Sequence[Estimate], benches: Sequence[str]) -> Agreement:
     """Return the agreement of a group's good runs, without a mean if they have no common value."""
-    called = _NAMES[quantity]
-    if not group:
-        return Agreement(called, name, mean=None, why="all its runs are among those that differ")
-    values = [getattr(run, quantity) for run in group]
-    agreed = agreement(called, name, values, [run.bench for run in group])
+    if not values:
+        return Agreement(quantity, name, mean=None, why="all its runs are among those that differ")
+    agreed = agreement(quantity, name, values, benches)
     scatter = max(x for x in (agreed.within, agreed.between, 0.0) if not math.isnan(x))
     if quantity == "spring_constant" and agreed.mean is not None and scatter > SCATTERED * agreed.mean.value:
         low, high = (f"{end.value:.4g}" for end in (min(values, key=float), max(values, key=float)))
@@ -103,7 +102,7 @@ def _run(row: Mapping[str, Any], bench: str, *, alone: bool) -> CourseRun:
         )
     return CourseRun(
         name=name,
-        spring=spring_of(row),
+        spring=_label(row.get("spring"), row.get("spring_mass_kg"), "g"),
         disc=disc_of(row),
         bench=str(row.get(bench) or ""),
         spring_constant=spring_constant,
@@ -114,11 +113,6 @@ def _run(row: Mapping[str, Any], bench: str, *, alone: bool) -> CourseRun:
         spring_mass_kg=scene.spring_mass_kg,
         implausible="; ".join(each.clause for each in slips(scene) if each.decides),
     )
-
-
-def spring_of(row: Mapping[str, Any]) -> str:
-    """Return the name of a run's spring, or else its mass."""
-    return _label(row.get("spring"), row.get("spring_mass_kg"), "g")
 
 
 def disc_of(row: Mapping[str, Any]) -> str:

@@ -1,7 +1,5 @@
 """Run tasks in this process, in processes of this machine, or on a dask cluster, with one loop for all of them."""
 
-from __future__ import annotations
-
 import contextlib
 import logging
 import os

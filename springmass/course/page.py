@@ -1,7 +1,5 @@
 """Write the page of a course, with the runs that most need inspection first, and what to tell each group."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Mapping, Sequence

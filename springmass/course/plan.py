@@ -235,10 +235,10 @@ class RunsTable:
         return os.path.normpath(os.path.join(glob.escape(os.path.abspath(self.path.parent)), text))
 
 
-def template(paths: Sequence[str]) -> str:
+def empty_table(paths: Sequence[str]) -> str:
     """Return a ``runs.csv`` to fill in, with one row per path.
 
-    >>> template(["#1.txt"]).splitlines()[1]
+    >>> empty_table(["#1.txt"]).splitlines()[1]
     './#1.txt,,,,,,,,,,,,'
     """
     out = io.StringIO()

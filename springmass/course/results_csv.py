@@ -1,7 +1,5 @@
 """The columns of a course's table, and ``results.csv``, the file that everything else reads."""
 
-from __future__ import annotations
-
 import csv
 import os
 import re
@@ -51,7 +49,7 @@ def columns_of(tags: Sequence[str]) -> tuple[str, ...]:
     return (*_FIRST, *tags, *COURSE_COLUMNS[len(_FIRST) :])
 
 
-def write_rows(folder: Path, rows: Iterable[Mapping[str, Any]], tags: Sequence[str]) -> None:
+def write_results(folder: Path, rows: Iterable[Mapping[str, Any]], tags: Sequence[str]) -> None:
     """Write ``results.csv`` whole: numbers with all their digits, unknown values empty, texts without formulas."""
     columns = columns_of(tags)
     with whole_file(folder / CSV) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
@@ -73,7 +71,7 @@ def is_course(folder: str | os.PathLike[str]) -> bool:
         return False
 
 
-def read_rows(folder: str | os.PathLike[str]) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
+def read_results(folder: str | os.PathLike[str]) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
     """Return the rows of ``results.csv`` by column, and the course's own columns; an empty cell is None."""
     if not is_course(folder):
         raise ProgramError(f"{folder}: expected a folder that springmass batch made", "name that of its -o")

@@ -1,7 +1,5 @@
 """Make one pass over a course: analyse new and changed runs, then write table, page and reports of all rows."""
 
-from __future__ import annotations
-
 import hashlib
 import heapq
 from collections.abc import Collection, Iterator, Sequence
@@ -9,15 +7,16 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from springmass.charts.browser import report_script
 from springmass.course.benches import compare_rows
 from springmass.course.executors import outcomes, workers
 from springmass.course.page import line_of, mark, write_groups, write_page
 from springmass.course.plan import Plan, key_of, made_of, names_of, software
-from springmass.course.results_csv import COURSE, FAILED, write_rows
+from springmass.course.results_csv import COURSE, FAILED, write_results
 from springmass.course.store import Store
 from springmass.course.worker import Remedy, analyse_one, blank_row, write_report_of
 from springmass.errors import LOG, ProgramError
-from springmass.report.html import SHARED, report_script
+from springmass.report.html import SHARED
 from springmass.result.output_names import safe_name
 from springmass.runs.tasks import Task
 from springmass.terminal.progress import counting
@@ -52,14 +51,14 @@ def run_course(
             done |= {key for key, _ in rows}
             made += len(rows)
             if len(done) >= ROWS_RATIO * written:
-                write_rows(folder, _table(course, store, done), course.tags)
+                write_results(folder, _table(course, store, done), course.tags)
                 written = len(done)
             for _, row in rows:
                 if row["status"] in FAILED:
                     LOG.warning(row["error"])
             show(made)
     table = _table(course, store, done)
-    write_rows(folder, table, course.tags)
+    write_results(folder, table, course.tags)
     return table, made, _write_pages(course, folder, table, reports, jobs, remedy, anew=bool(todo))
 
 

@@ -4,8 +4,6 @@ Rows are added in batches of one transaction each, so after a crash a row is who
 off: a lock on ``course.lock`` keeps a second pass out, and that file names the process that holds it.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

@@ -1,7 +1,5 @@
 """Turn a run into its row, or into its report: the work of every process, on this machine or another."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Mapping

@@ -1,10 +1,8 @@
 """Recordings from arrays in memory: their units are read or refused, never ignored."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Collection, Mapping
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,7 +17,7 @@ from pipeline.track import F8, Track
 from springmass.loading.inputs import kind_of
 from springmass.loading.load import load
 from springmass.loading.loaded import Loaded
-from springmass.loading.options import AnalysisOptions, LoadOptions
+from springmass.loading.options import LOAD_FIELDS, AnalysisOptions
 
 EXPECTED = "a path, a run, a pair (t, y), or a dataset, frame or mapping with time and distance was expected"
 ABOUT = "springmass"
@@ -31,7 +29,7 @@ def loaded_of(source: Any, options: AnalysisOptions) -> Loaded:
 
     A dataset of springmass, or one that xarray read from a run file, comes with all that the file states.
     """
-    _demand(options, {"unit", "time_unit"}, type(source).__name__)
+    refuse_reading(options, type(source).__name__, ("unit", "time_unit"))
     t, y, flags = _columns(source)
     about: Mapping[str, Any] = getattr(source, "attrs", {})
     measure = _measure(options.unit or y.unit or _unit_of(y.values) or "m")
@@ -51,14 +49,9 @@ def loaded_of(source: Any, options: AnalysisOptions) -> Loaded:
     return Loaded(Recording("", "", SourceInfo(*info), "", samples), "memory")
 
 
-def refuse_reading(options: AnalysisOptions) -> None:
-    """Refuse options of reading for a run that was read before, on which they would have no effect."""
-    _demand(options, (), "run that is read already")
-
-
-def _demand(options: AnalysisOptions, allowed: Collection[str], what: str) -> None:
-    reading = {each.name for each in fields(LoadOptions)}
-    if others := [name for name in options.given() if name in reading and name not in allowed]:
+def refuse_reading(options: AnalysisOptions, what: str, allowed: Collection[str] = ()) -> None:
+    """Refuse options of reading for what is no file, on which they would have no effect."""
+    if others := [name for name in options.given() if name in LOAD_FIELDS and name not in allowed]:
         raise TrackError(f"{', '.join(others)} complete recordings named by a path, got a {what}", "leave that out")
 
 

@@ -1,7 +1,5 @@
 """Find the files that an input names: the file itself, or the recordings in a folder; tell what a file is."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Load a recording, a run file or a wire log, with everything that its reader noticed."""
 
-from __future__ import annotations
-
 import shutil
 import sys
 import tempfile

@@ -1,7 +1,5 @@
 """The options of reading and of analysing a recording, for the command line, courses, the page and Python alike."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import Field, dataclass, field, fields, replace
 from types import EllipsisType

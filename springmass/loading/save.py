@@ -1,7 +1,5 @@
 """Write a run file of a recording that was loaded, with the origin and the time that every run file states."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime

@@ -1,7 +1,5 @@
 """Scenes from files or given in Python: masses, disc, air and sensor of the bench; and values that replace some."""
 
-from __future__ import annotations
-
 import codecs
 import os
 import re
@@ -82,13 +80,13 @@ def read_tables(path: str | Path) -> dict[str, Any]:
         raise ProgramError(f"{path}: not a TOML file ({reason})", "see the scene file in the reference") from error
 
 
-def amended(scene: Scene, values: Amendments, *, where: str) -> Scene:
-    """Return a scene with some values replaced."""
+def amended(scene: Scene, values: Amendments) -> Scene:
+    """Return a scene with some values replaced by those of the command line."""
     tables = scene.to_mapping()
     for (table, key), value in values.items():
         tables.setdefault(table, {})[key] = value
     try:
-        return Scene.from_mapping(tables, where=where)
+        return Scene.from_mapping(tables, where="the command line")
     except SceneError as error:
         raise ProgramError(error.problem, error.remedy, where=error.where) from error
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import functools
-import hashlib
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,11 +15,11 @@ from pipeline.findings.finding import kinds
 from pipeline.numerics.estimate import Estimate
 from pipeline.quantities import EFFECTS, INPUTS, QUANTITIES
 from pipeline.track import Track
-from springmass.charts.browser import chart_style, report_source
+from springmass.charts.browser import chart_style, report_script
 from springmass.charts.chart import Chart, to_json
-from springmass.comparing.comparison import SpringComparison, comparison_words
+from springmass.comparing.comparison import SpringComparison
 from springmass.report.recorded import bench_words, calibration_of, date_words, notes_of
-from springmass.report.words import method, summary
+from springmass.report.words import method, summary, verdict
 from springmass.result.advice import SEVERITY_WORDS, notices_of
 from springmass.result.budget_tables import budgets_of, correlations_of
 from springmass.result.grades import all_sound, grades_of, leaves_more_than_noise
@@ -102,9 +101,7 @@ def render_html(
         of_reported={code for code, kind in kinds().items() if "reported" in kind.about},
         reported="" if compared is None else _reported_words(compared),
         periods={run.name: (run["period"], run.analysis.derived.effective_mass_kg) for run in runs if run.ok},
-        verdict=""
-        if compared is None
-        else typeset(" ".join([compared.comparison.message, *comparison_words(compared)])),
+        verdict="" if compared is None else " ".join(verdict(compared)),
         joint=() if compared is None else [laws_across(joint) for joint in compared.joint],
         provenance=list(_flattened(provenance)),
         version=provenance["version"],
@@ -117,18 +114,6 @@ def drawn_by_script(charts: Sequence[Mapping[str, Any]], address: str = "") -> d
     """Return what a template needs to draw charts: their numbers, the style, and the script or its address."""
     script = "" if address else report_script()
     return {"charts": charts, "chart_style": chart_style(), "script": script, "script_address": address}
-
-
-@functools.cache
-def report_script() -> str:
-    """Return the script of reports; its sources may hold neither </script nor <!--, which would end its element."""
-    return f"\n{report_source()}\n"
-
-
-@functools.cache
-def script_sha256() -> str:
-    """Return the base64 digest of the script for ``'sha256-...'`` in a Content-Security-Policy."""
-    return base64.b64encode(hashlib.sha256(report_script().encode()).digest()).decode()
 
 
 def page_style() -> str:

@@ -14,7 +14,7 @@ from pipeline.simulation.band import LEVELS, Band
 from pipeline.track import F8
 from springmass.result.output_names import in_a_name, make_folder
 from springmass.simulations.run_files import write_states
-from springmass.simulations.simulation import Simulation, beside_measured, summary
+from springmass.simulations.simulation import Simulation, beside_measured, simulation_json
 
 if TYPE_CHECKING:
     from springmass.charts.draw import Counting, PictureFormat
@@ -58,7 +58,7 @@ def write(
         write_whole(folder / SIMULATION_PAGE, page)
         for table_name, table in tables.items():
             write_whole(folder / f"{table_name}.csv", _table(table))
-        write_whole(folder / "simulation.json", json.dumps(summary(simulation), indent=2) + "\n")
+        write_whole(folder / "simulation.json", json.dumps(simulation_json(simulation), indent=2) + "\n")
     return target
 
 

@@ -1,4 +1,4 @@
-"""The result of a run in words: the summary, the damping law, the method."""
+"""Results in words: the summary, the damping law and the method of a run, and whether several runs agree."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pipeline.damping.laws import words_of
 from pipeline.quantities import INPUTS
 from pipeline.results.budget import Contribution
 from pipeline.units import noun
+from springmass.comparing.comparison import SpringComparison, comparison_words
 from springmass.result.advice import harm_of, sentence
 from springmass.result.budget_tables import budgets_of
 from springmass.result.grades import grades_of, grades_text, leaves_more_than_noise
@@ -105,6 +106,11 @@ def damping_sentence(analysis: Analysis) -> str:
         return f"{text}; {all_others} {'rejected' if rejected else 'unlikely'}."
     ruled_out = f"{rejected} {'is' if rejected == 1 else 'are'} rejected and {others - rejected} unlikely"
     return f"{text}; of {others} other laws {ruled_out}."
+
+
+def verdict(compared: SpringComparison) -> list[str]:
+    """Return whether several runs agree on one spring, and what explains their periods, in sentences."""
+    return [typeset(text) for text in (compared.comparison.message, *comparison_words(compared))]
 
 
 def listed(words: Sequence[str]) -> str:

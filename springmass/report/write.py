@@ -13,19 +13,18 @@ from springmass.charts.chart import Chart
 from springmass.charts.draw import Counting, PictureFormat, save
 from springmass.charts.run import CHARTS, charts_of
 from springmass.charts.several import comparison, masses, overlay, static
-from springmass.comparing.comparison import SpringComparison, comparison_words
+from springmass.comparing.comparison import SpringComparison
 from springmass.errors import LOG
 from springmass.report.html import render_html
 from springmass.report.latex import budget_tex, lab_report_tex, table_tex
 from springmass.report.motion_table import amplitude_csv, motion_csv
 from springmass.report.recorded import notes_of
+from springmass.report.words import verdict
 from springmass.result.budget_tables import budget_csv
-from springmass.result.frames import smoothed_or_why
 from springmass.result.output_names import safe_name
 from springmass.result.run_json import plain
 from springmass.result.table1 import results_csv
 from springmass.runs.run import Run
-from springmass.typeset import typeset
 from storage.atomic import remove_files, whole_folder, write_whole
 
 REPORT_PAGE = "report.html"
@@ -56,39 +55,21 @@ def write_report(
     run. ``counting`` shows how many figures are drawn.
     """
     directory, stems = Path(directory), _stems([run.name for run in runs])
-    pdf: tuple[PictureFormat, ...] = ("pdf",) if template is not None else ()
-    kinds = list(dict.fromkeys((*figures, *pdf)))
-    names, analyses = [run.name for run in runs], [run.analysis for run in runs]
-    motions = [smoothed_or_why(analysis) for analysis in analyses]
-    charts = [
-        charts_of(
-            run.analysis,
-            notes_of(run.recorded),
-            run.classic,
-            None if isinstance(each, str) else each,
-            profiles=bool(figures),
-        )
-        for run, each in zip(runs, motions, strict=True)
-    ]
-    several: dict[str, Chart] = {}
-    if len(runs) > 1 and (over := overlay(names, analyses)) is not None:
-        several["overlay"] = over
-    if compared is not None:
-        several["comparison"] = comparison(compared.comparison)
-        if compared.line is not None:
-            several["masses"] = masses(compared.line)
-        if compared.hooke is not None:
-            several["hooke"] = static(compared.hooke)
+    kinds: list[PictureFormat] = list(dict.fromkeys((*figures, *(("pdf",) if template is not None else ()))))
+    names, analyses, several = [run.name for run in runs], [run.analysis for run in runs], charts_across(runs, compared)
+    charts = {
+        stem: charts_of(run.analysis, notes_of(run.recorded), run.classic, profiles=bool(figures))
+        for stem, run in zip(stems, runs, strict=True)
+    }
     with whole_folder(directory, _names([*stems, *_earlier_stems(directory)]), REPORT_PAGE) as folder:
         pictures: dict[str, bytes] = {}
         if kinds:
             (folder / "figures").mkdir()
-            named = zip(["", *stems], [several, *charts], strict=True)
-            drawn = {f"{stem}{name}": chart for stem, some in named for name, chart in some.items()}
-            pictures = save(drawn, folder / "figures", kinds, counting)
-        for stem, analysis, smoothed in zip(stems, analyses, motions, strict=True):
-            if not isinstance(smoothed, str):
-                write_whole(folder / f"{stem}motion.csv", motion_csv(analysis, smoothed))
+            of_runs = {f"{stem}{name}": chart for stem, some in charts.items() for name, chart in some.items()}
+            pictures = save({**several, **of_runs}, folder / "figures", kinds, counting)
+        for stem, analysis in zip(stems, analyses, strict=True):
+            if analysis.smoothed is not None:
+                write_whole(folder / f"{stem}motion.csv", motion_csv(analysis, analysis.smoothed))
             if amplitudes := amplitude_csv(analysis):
                 write_whole(folder / f"{stem}amplitude.csv", amplitudes)
         results = [run.result for run in runs]
@@ -106,7 +87,7 @@ def write_report(
             write_whole(folder / name, table)
         page = render_html(
             runs,
-            dict(zip(stems, charts, strict=True)),
+            charts,
             compared=compared,
             several=several,
             pictures=pictures,
@@ -117,16 +98,24 @@ def write_report(
         if template is not None:
             captions = [
                 {f"{stem}{name}": of_run[name].caption for name in OF_LAB_REPORT if name in of_run}
-                for stem, of_run in zip(stems, charts, strict=True)
+                for stem, of_run in charts.items()
             ]
-            sentences = (
-                []
-                if compared is None
-                else [typeset(x) for x in (compared.comparison.message, *comparison_words(compared))]
-            )
+            sentences = [] if compared is None else verdict(compared)
             write_whole(folder / LAB_REPORT, lab_report_tex(runs, captions, sentences))
     LOG.debug(f"written: {directory}: {', '.join(sorted(each.name for each in directory.iterdir()))}")
     return directory / REPORT_PAGE
+
+
+def charts_across(runs: Sequence[Run], compared: SpringComparison | None) -> dict[str, Chart]:
+    """Return the charts of several runs together, by name."""
+    charts = [overlay([run.name for run in runs], [run.analysis for run in runs]) if len(runs) > 1 else None]
+    if compared is not None:
+        charts += [
+            comparison(compared.comparison),
+            None if compared.line is None else masses(compared.line),
+            None if compared.hooke is None else static(compared.hooke),
+        ]
+    return {chart.name: chart for chart in charts if chart is not None}
 
 
 def remove_report(directory: Path) -> None:

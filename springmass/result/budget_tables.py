@@ -34,7 +34,7 @@ def budgets_of(analysis: Analysis) -> tuple[BudgetRow, ...]:
     Frequencies are omitted, because they share the period's budget.
     """
     budgets, rows = analysis.budgets, []
-    for name in dict.fromkeys(key.name for key in table_estimates(analysis)):
+    for name in dict.fromkeys(name for name, _ in table_estimates(analysis)):
         if name in budgets and name not in SAME and budgets[name].contributions:
             every = budgets[name].contributions
             listed = tuple(c for c in every if c.share >= LEAST_SHARE)

@@ -11,9 +11,7 @@ import numpy as np
 from acquisition.block import Flag
 from pipeline.analyse import Analysis
 from pipeline.bench.scene import Scene
-from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
-from pipeline.results.curves import Smoothed
 from pipeline.several.compare import Comparison
 from pipeline.track import Quality
 from pipeline.units import Unit
@@ -100,8 +98,7 @@ def run_dataset(loaded: Loaded, analysis: Analysis, name: str) -> xr.Dataset:
     if motion is not None:
         fit = {"fit": motion.waveform.position, "residual": motion.waveform.residual, "rest": motion.rest.at(track.t)}
         variables |= {name: ("time", values, {"units": of_value}) for name, values in fit.items()}
-        smoothed = smoothed_or_why(analysis)
-        if not isinstance(smoothed, str):
+        if (smoothed := analysis.smoothed) is not None:
             for name, unit in (("position", of_value), ("velocity", of_first), ("acceleration", of_second)):
                 variables[f"smoothed_{name}"] = ("time", getattr(smoothed, name), {"units": unit})
                 variables[f"u_smoothed_{name}"] = ("time", getattr(smoothed, f"u_{name}"), {"units": unit})
@@ -120,13 +117,3 @@ def run_dataset(loaded: Loaded, analysis: Analysis, name: str) -> xr.Dataset:
     for quantity, value in numbers_of(analysis).items():
         variables[quantity] = ((), value.value, {"u": value.u, "units": value.unit or "1"})
     return dataset.assign_coords(coordinates).assign(variables).assign_attrs(name=name)
-
-
-def smoothed_or_why(analysis: Analysis) -> Smoothed | str:
-    """Return the smoothed motion, or the reason in words why there is none."""
-    if analysis.oscillation is None:
-        return "nothing oscillates"
-    try:
-        return analysis.smoothed()
-    except AnalysisError as error:
-        return str(error)

@@ -6,37 +6,13 @@ import csv
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from pipeline.analyse import Analysis
 from pipeline.damping.laws import LAWS
 from pipeline.findings.finding import kinds
 from pipeline.numerics.estimate import Estimate
 from pipeline.quantities import QUANTITIES
-from springmass.typeset import NOTHING, cell
-
-
-class TableKey(NamedTuple):
-    """The identity of a line of Table 1.
-
-    ``law`` is the law that the value assumes, "" for an average over laws, None if the table names none; ``certain``
-    says whether all results assume it, because the user states it or the recording supports no other.
-    """
-
-    name: str
-    law: str | None = None
-    certain: bool = False
-    row: str = ""
-    """The law whose values have a separate row, for coefficients."""
-
-    @property
-    def words(self) -> str:
-        """The damping law that the value assumes, in words; empty if the table names none."""
-        if self.law is None:
-            return ""
-        if not self.law:
-            return "any law"
-        return f"law {self.law}" if self.certain else f"if {self.law}"
+from springmass.typeset import cell
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,22 +28,33 @@ class TableRow:
     note: str = ""
 
     @property
-    def cells(self) -> tuple[str, ...]:
-        """The estimates as printed, with two digits of u."""
-        return tuple(NOTHING if x is None else str(x) for x in self.estimates)
-
-    @property
     def on_screen(self) -> str:
         """The symbol in Unicode where an index cannot be set lower, as in T_s."""
         return self.page_symbol.replace(" ", "_")
 
 
-def table_estimates(analysis: Analysis) -> dict[TableKey, Estimate]:
-    """Return the contents of Table 1 for a run: estimates and coefficients, each with its law."""
-    shown = _shown_estimates(analysis)
+def table_estimates(analysis: Analysis) -> dict[tuple[str, str], tuple[str, Estimate]]:
+    """Return the contents of Table 1 for a run: each value with the damping law that it assumes, in words.
+
+    The keys are the name of a quantity and, for a coefficient, the law whose values have a separate row. A coefficient
+    is that of a law if all results assume it, because the user states it or the recording supports no other.
+    """
+    derived, damping = analysis.derived, analysis.damping
+    law, certain = derived.law_of_coefficients, bool(damping.admissible) or damping.by_statement
+    # A coefficient of a user-defined law is not one of these quantities, even if it has the same name.
+    coefficients = derived.coefficients if derived.quoted and law in LAWS else {}
     moving = ("m/s", "m/s^2", "rad/s")  # what is recorded of a motion is zero on average, and a sensor's zero no result
-    if is_about(analysis, "offset") or analysis.track.unit in moving:
-        shown.pop(TableKey("offset"), None)
+    shown = {}
+    for name, quantity in QUANTITIES.items():
+        no_zero = name == "offset" and (is_about(analysis, "offset") or analysis.track.unit in moving)
+        if no_zero or not quantity.in_table:
+            continue
+        if name in derived.estimates:
+            by_law = quantity.by_law and derived.laws
+            words = "" if not by_law else f"law {derived.law}" if derived.law else "any law"
+            shown[name, ""] = words, derived.estimates[name]
+        elif name in coefficients:
+            shown[name, law] = f"{'law' if certain else 'if'} {law}", coefficients[name]
     return shown
 
 
@@ -76,37 +63,16 @@ def is_about(analysis: Analysis, subject: str) -> bool:
     return any(subject in kinds()[finding.code].about for finding in analysis.findings)
 
 
-def _shown_estimates(analysis: Analysis) -> dict[TableKey, Estimate]:
-    derived, damping = analysis.derived, analysis.damping
-    law, certain = derived.law_of_coefficients, bool(damping.admissible) or damping.by_statement
-    # A coefficient of a user-defined law is not one of these quantities, even if it has the same name.
-    coefficients = derived.coefficients if derived.quoted and law in LAWS else {}
-    shown = {}
-    for name in _IN_TABLE:
-        if name in derived.estimates:
-            by_law = QUANTITIES[name].by_law and derived.laws
-            key = TableKey(name, derived.law, bool(derived.law)) if by_law else TableKey(name)
-            shown[key] = derived.estimates[name]
-        elif name in coefficients:
-            shown[TableKey(name, law, certain, law)] = coefficients[name]
-    return shown
-
-
-_IN_TABLE = tuple(name for name, quantity in QUANTITIES.items() if quantity.in_table)
-
-
 def table_rows(runs: Sequence[Analysis]) -> tuple[TableRow, ...]:
     """Return Table 1: every quantity that at least one run gives, with one column per run."""
     columns = [table_estimates(run) for run in runs]
     rows = []
     for name, q in QUANTITIES.items():
-        keys = [{key.row: key for key in run if key.name == name} for run in columns]
-        for i, law in enumerate(dict.fromkeys(row for of_run in keys for row in of_run)):
-            words = {of_run[law].words for of_run in keys if law in of_run}
+        cells = [{law: cell for (of, law), cell in column.items() if of == name} for column in columns]
+        for i, law in enumerate(dict.fromkeys(law for of_run in cells for law in of_run)):
+            words = {of_run[law][0] for of_run in cells if law in of_run}
             label = words.pop() if len(words) == 1 else f"if {law}" if law else "by each run's law"
-            estimates = tuple(
-                run[of_run[law]] if law in of_run else None for run, of_run in zip(columns, keys, strict=True)
-            )
+            estimates = tuple(of_run[law][1] if law in of_run else None for of_run in cells)
             rows.append(
                 TableRow(
                     f"{law}.{name}" if i else name,
@@ -136,9 +102,8 @@ NEEDS_MASS = "needs the mass"
 
 def _needs_mass(run: Analysis) -> bool:
     """Return whether a distance oscillates and only the mass is missing."""
-    column = table_estimates(run)
-    amplitude = column.get(TableKey("amplitude"))
-    of_length = TableKey("period") in column and amplitude is not None and amplitude.unit == "m"
+    estimates = run.derived.estimates
+    of_length = "period" in estimates and "amplitude" in estimates and estimates["amplitude"].unit == "m"
     return of_length and run.scene.bob_mass_kg is None and run.scene.hangs_on_spring
 
 

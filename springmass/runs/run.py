@@ -91,7 +91,7 @@ class Run(Mapping[str, Estimate]):
             loaded = load(Path(source), how, scene_given=scene is not None).within(how)
             how = replace(how, **loaded.reading)
         elif isinstance(source, Run):
-            refuse_reading(how)
+            refuse_reading(how, "run that is read already")
             loaded = source.loaded.within(how)
             scene, name = source.stated if scene is None else scene, name or source.name
             how = replace(source.how, **how.given())

@@ -1,10 +1,9 @@
 """Recordings to analyse one after the other: a task for each, and its analysed run or the reason why there is none."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, TypeVar
 
 from acquisition.errors import AcquisitionError, NeedsAnswer
@@ -42,15 +41,15 @@ class Failed:
 def analyse_all(tasks: Iterable[Task]) -> Iterator[Run | Failed]:
     """Yield the analysed run of each recording, or why there is none; a failure does not stop the others."""
     for task in tasks:
+        yield attempted(task, partial(_analysed, task))
 
-        def analysed(task: Task = task) -> Run:
-            run = Run.of(task.source, task.scene, task.how, task.name)
-            if task.values:
-                run = replace(run, stated=amended(run.scene, task.values, where="the command line"))
-            _ = run.analysis
-            return run
 
-        yield attempted(task, analysed)
+def _analysed(task: Task) -> Run:
+    run = Run.of(task.source, task.scene, task.how, task.name)
+    if task.values:
+        run = replace(run, stated=amended(run.scene, task.values))
+    _ = run.analysis
+    return run
 
 
 def attempted(task: Task, make: Callable[[], Made]) -> Made | Failed:
@@ -77,7 +76,7 @@ def _unreadable(error: Error, where: str) -> ProgramError:
     return ProgramError(error.problem, error.remedy, where=where, exit_code=UNREADABLE)
 
 
-def analysed(tasks: Iterable[Task]) -> list[Run]:
+def analysed_runs(tasks: Iterable[Task]) -> list[Run]:
     """Return the analysed run of each recording; the first failure is an error."""
     runs = []
     for outcome in analyse_all(tasks):

@@ -4,12 +4,10 @@ The operator works on the session's thread and checks for requests between its w
 sensors, which has a separate thread. The page is informed of each action after it is done.
 """
 
-from __future__ import annotations
-
 import contextlib
 import shutil
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
@@ -58,7 +56,6 @@ class Operator:
     _folder: Path | None = None
     _preview: Recorder | None = None
     _number: int = 0
-    _postponed: Mapping[str, Any] | None = None
 
     def begin(self) -> None:
         """Show the bench on the page before there is a run, by means of a preview log."""
@@ -91,9 +88,9 @@ class Operator:
                 self.begin()
                 self._tell("ready")
                 since_ns = self.session.now_ns()
-            if self._postponed is None and self.page.requests.empty():
+            if self.page.requests.empty():
                 continue
-            request, self._postponed = self._postponed or self.page.requests.get(), None
+            request = self.page.requests.get()
             match request.get("type"):
                 case "record":
                     return None
@@ -115,7 +112,7 @@ class Operator:
                     case "close":
                         raise Closed
                     case "arm" | "record":
-                        self._postponed = request  # carried out by `prepare` after the wait has ended
+                        self.page.requests.put(request)  # `prepare` carries it out after the wait has ended
                         return True
                     case "disarm":
                         return True

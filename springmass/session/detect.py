@@ -1,7 +1,5 @@
 """Find the sensors on the ports of this machine by what they send."""
 
-from __future__ import annotations
-
 import contextlib
 import shlex
 from collections.abc import Sequence

@@ -3,8 +3,6 @@
 A ``Worker`` does what may fail or wait, such as showing the recording, on a thread of its own.
 """
 
-from __future__ import annotations
-
 import contextlib
 import queue
 import threading

@@ -1,7 +1,5 @@
 """Choose and check the file names of a recording before it begins."""
 
-from __future__ import annotations
-
 import glob
 import itertools
 import os

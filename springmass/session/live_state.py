@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import functools
 import math
 import mmap
 import shutil
@@ -116,21 +117,15 @@ class LiveState:
 
     def __init__(self, rolling: Callable[[int], Rolling]) -> None:
         self.missing = 0
-        self._rolling = rolling
-        self._has_room = False
         self.useful: dict[int, Usefulness] = {}
         self.origin = Origin()
-        self._begin(0)
-
-    def _begin(self, channel: int) -> None:
-        self._channel = channel
-        self._motion = self._rolling(channel)
+        self._rolling, self._channel, self._motion = rolling, 0, rolling(0)
 
     def follow(self, channel: int) -> None:
         """Show the motion of a different channel from now on: that of the sensor that came back on the first port."""
         if channel != self._channel:
             self.useful.pop(self._channel, None)
-            self._begin(channel)
+            self._channel, self._motion = channel, self._rolling(channel)
 
     def push(self, blocks: Iterable[tuple[int, Block]]) -> None:
         """Take blocks of samples by channel."""
@@ -145,9 +140,7 @@ class LiveState:
 
     def motion(self) -> Run | NotYet:
         """Return the run of the first sensor's last seconds, or why there is none yet."""
-        if not self._has_room:
-            demand_room()
-            self._has_room = True
+        demand_room()
         return self._motion.latest()
 
     def silent_s(self, now_ns: int) -> float:
@@ -160,6 +153,7 @@ class LiveState:
         return int(np.count_nonzero(self._motion.host_ns >= now_ns - SECOND_NS))
 
 
+@functools.cache
 def demand_room() -> None:
     """Raise MemoryError if the libraries of the analysis would not find memory, which would block or end the process.
 

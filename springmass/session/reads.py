@@ -5,8 +5,6 @@ decoder are counted and go no further. A separate thread for decoding would be w
 than decoding a reading.
 """
 
-from __future__ import annotations
-
 import threading
 from collections import deque
 from collections.abc import Sequence

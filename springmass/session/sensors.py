@@ -1,7 +1,5 @@
 """One sensor of a recording: its identity, the decoding of its bytes into samples, and its entry in the log."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any

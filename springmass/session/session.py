@@ -53,7 +53,7 @@ HELD_BLOCKS = 1000  # maximum number of blocks kept for the display before the r
 BYTES_PER_READ = 64  # log bytes per reading, for the check of the disk space
 SHOWN_S = 10.0  # duration of the samples whose period and amplitude the progress line shows
 LIVE = AnalysisOptions(accuracy="fast")
-"""The fast tier takes a third of the time of the standard tier, with which the run is analysed."""
+"""The fast tier takes four fifths of the time of the standard tier, with which the run is analysed."""
 MOTION_SHARE = 0.01
 """Share of a core for the shown motion, a new one every other second; a recording may take 3 % with all else."""
 

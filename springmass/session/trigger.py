@@ -1,7 +1,5 @@
 """Start a recording automatically when the bob leaves its rest position."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -57,19 +57,6 @@ class Against:
     leaves_band_s: float | None = None
     shifts: tuple[InputShift, ...] = ()
 
-    def summary(self) -> dict[str, Any]:
-        """Return the comparison as the JSON of ``springmass simulate`` has it."""
-        return {
-            "rms_m": self.rms_m,
-            "noise_m": self.noise_m,
-            "inside_95": self.inside,
-            "leaves_s": self.leaves_band_s,
-            "moves": [
-                {"name": shift.name, "from": shift.given, "to": shift.value, "in_u": shift.in_u, "rms_m": shift.rms_m}
-                for shift in self.shifts
-            ],
-        }
-
 
 def compare_with_run(
     analysis: Analysis, trajectory: Trajectory, band: Band | None, values: Mapping[str, Estimate]
@@ -96,6 +83,20 @@ def compare_with_run(
     inside = 1.0 - float(np.mean(outside))
     leaves_band_s = _leaves(t, outside, trajectory.problem)
     return Against(*known, around, inside, leaves_band_s, shifts)
+
+
+def against_json(against: Against) -> dict[str, Any]:
+    """Return the comparison as the JSON of ``springmass simulate`` has it."""
+    return {
+        "rms_m": against.rms_m,
+        "noise_m": against.noise_m,
+        "inside_95": against.inside,
+        "leaves_s": against.leaves_band_s,
+        "moves": [
+            {"name": shift.name, "from": shift.given, "to": shift.value, "in_u": shift.in_u, "rms_m": shift.rms_m}
+            for shift in against.shifts
+        ],
+    }
 
 
 def _amplitude_at(analysis: Analysis, motion: Oscillation, t: float) -> Estimate:

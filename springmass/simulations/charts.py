@@ -1,4 +1,4 @@
-"""Charts of a simulation: forward and symplectic Euler as in the lab report, beside the exact solution."""
+"""Charts of a simulation: both Euler methods beside the exact motion, the band, and the run that is predicted."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def _both(
 ) -> tuple[Panel, ...]:
     """Return a panel for each method; ``values`` takes a trajectory and the number of its rows."""
     panels = []
-    for (_, words), run in zip(EULERS, runs.eulers, strict=True):
+    for words, run in zip((euler.words for euler in EULERS), runs.eulers, strict=True):
         x, y = values(run, len(run.y))
         beside_x, beside_y = values(runs.exact, len(run.y))
         lines = (line_of(runs.words, beside_x, beside_y), Series(words, x, y, "other" if measured else "data", True))
@@ -115,8 +115,8 @@ def _measured(solved: Simulation, mass_kg: float, over: Against | None, end_s: f
 def _error(solved: Simulation, runs: Eulers) -> tuple[Panel, ...]:
     """Return running maxima of the errors, because an error crosses zero twice per period."""
     start = solved.problem.amplitude_m() or 1.0
-    curves = [(run, words) for run, (_, words) in zip(runs.eulers, EULERS, strict=True)]
-    if solved.solution.integrator.name not in [name for name, _ in EULERS] and solved.trajectory is not runs.exact:
+    curves = [(run, euler.words) for run, euler in zip(runs.eulers, EULERS, strict=True)]
+    if solved.solution.integrator.name not in [euler.name for euler in EULERS] and solved.trajectory is not runs.exact:
         curves.append((solved.trajectory, solved.solution.integrator.words))
     series = []
     for run, words in curves:

@@ -16,7 +16,7 @@ from pipeline.bench.scene import Scene
 from pipeline.simulation import Trajectory
 from springmass.loading.save import made_now
 from springmass.simulations.bench import REST_M
-from springmass.simulations.simulation import FINE, Simulation, count_of, solve, summary
+from springmass.simulations.simulation import FINE, Simulation, count_of, simulation_json, solve
 
 
 def write_readings(path: Path, solved: Simulation, sensor: str, seed: int) -> None:
@@ -32,14 +32,14 @@ def write_readings(path: Path, solved: Simulation, sensor: str, seed: int) -> No
         if ready.stated.sensor_sigma_m is not None:
             virtual = replace(virtual, noise_m=ready.stated.sensor_sigma_m.value)
         block, info = _readings(solved, virtual, name, seed)
-    configuration = {"sensor": sensor, "seed": seed, **summary(solved)}
+    configuration = {"sensor": sensor, "seed": seed, **simulation_json(solved)}
     _write_run(path, block, info, ready.solved, f"{name}, as a {sensor} sensor reads it", configuration)
 
 
 def write_states(path: Path, solved: Simulation, title: str) -> None:
     """Write the states of a motion as a run, as a sensor without noise, echoes or resolution would read them."""
     block, info = _exact(solved.trajectory, Path(solved.where).name)
-    configuration = {"rest_m": _rest_m(solved.trajectory), **summary(solved)}
+    configuration = {"rest_m": _rest_m(solved.trajectory), **simulation_json(solved)}
     _write_run(path, block, info, solved.ready.solved, title, configuration)
 
 

@@ -25,7 +25,7 @@ from pipeline.simulation.methods import DOP853
 from pipeline.track import F8
 from springmass.errors import LOG, ProgramError
 from springmass.result.run_json import picked, plain
-from springmass.simulations.against import Against, compare_with_run, duration_s
+from springmass.simulations.against import Against, against_json, compare_with_run, duration_s
 from springmass.simulations.from_run import SCENE_KEYS, scene_from_run
 from springmass.typeset import prefixed
 
@@ -38,7 +38,7 @@ FINE = 24.0  # states per radian; interpolation between them has an error of 1e-
 BAND_SHARE, LARGEST_DEFAULT = 0.01, 1e-3
 MOST_SAMPLES = 20_000_000
 REFERENCE_RTOL = 1e-13
-EULERS = (("forward-euler", "forward Euler"), ("symplectic-euler", "symplectic Euler"))
+EULERS = tuple(get_integrator(name) for name in ("forward-euler", "symplectic-euler"))
 VISIBLE_ERROR, EXACT_ERROR = 1e-3, 1e-9  # errors over the amplitude: one that is visible, and one that is called exact
 EFFECT_COLUMNS = ("name", "predicted", "measured", "unit", "included", "why")
 GROWTH_COLUMNS = ("method", "predicted", "measured", "fails_above_s")
@@ -153,7 +153,7 @@ def solve(
     return halved(problem, integrator, spacing_s, count, wanted, time.perf_counter)
 
 
-def band_of(ready: Prepared, seconds: float) -> tuple[Band | None, str]:
+def band_or_why(ready: Prepared, seconds: float) -> tuple[Band | None, str]:
     """Return the band from the uncertain inputs and how it was computed, or the reason why there is none."""
     if not ready.values():
         return None, "none: the scene states no uncertainties"
@@ -246,11 +246,10 @@ class Simulation:
         turn = self.problem.equation.angular_frequency_per_s * self.trajectory.spacing_s
         period = max(1, round(2.0 * math.pi / turn))
         rows = []
-        for name, words in EULERS:
-            integrator = get_integrator(name)
-            predicted = math.sqrt(1.0 + turn * turn) if name == "forward-euler" else 1.0
-            measured = _measured_growth(self, integrator, period)
-            rows.append(Growth(name, words, predicted, measured, integrator.stable_step(self.problem)))
+        for euler in EULERS:
+            predicted = math.sqrt(1.0 + turn * turn) if euler.name == "forward-euler" else 1.0
+            measured = _measured_growth(self, euler, period)
+            rows.append(Growth(euler.name, euler.words, predicted, measured, euler.stable_step(self.problem)))
         return tuple(rows)
 
 
@@ -268,7 +267,7 @@ def simulated(scene: Scene, options: SimulationOptions, run: Run | None = None, 
     ready = prepare(scene, longest_s, analysis=analysis, where=where or "scene")
     if run is not None:
         LOG.info(f"from {run.loaded.path}: {', '.join(ready.from_run)}")
-    band, of_band = band_of(ready, longest_s)
+    band, of_band = band_or_why(ready, longest_s)
     tolerance = default_tolerance(band) if options.tolerance is None and method == "auto" else options.tolerance
     if not options.force:
         demand_stable(ready.problem, method, spacing_s if options.tolerance is None else None)
@@ -330,8 +329,7 @@ def _apart(run: Trajectory, other: Trajectory) -> float:
     return float(np.max(np.abs(run.y - other.y))) / start if start else 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Eulers:
+class Eulers(NamedTuple):
     """Both Euler methods with the step of a simulation, and the motion with which they are compared."""
 
     exact: Trajectory
@@ -350,15 +348,15 @@ def beside_exact(solved: Simulation) -> Eulers:
             run, error = better.trajectory, better.error
         if error is None or error >= EXACT_ERROR:
             words = f"solved to {error:.0e}"
-    return Eulers(run, words, tuple(_euler(solved.problem, run, name) for name, _ in EULERS))
+    return Eulers(run, words, tuple(_euler(solved.problem, run, euler) for euler in EULERS))
 
 
-def _euler(problem: Problem, exact: Trajectory, name: str) -> Trajectory:
+def _euler(problem: Problem, exact: Trajectory, euler: Integrator) -> Trajectory:
     """Run a method with the run's spacing; if it diverges, halve the duration until it can be solved."""
     count = len(exact.y) - 1
     while True:
         try:
-            return get_integrator(name).run(problem, exact.spacing_s, count)
+            return euler.run(problem, exact.spacing_s, count)
         except DynamicsError:
             if count < 2:
                 raise
@@ -470,7 +468,7 @@ def _measured_growth(solved: Simulation, integrator: Integrator, period: int) ->
     return math.exp(grown) if math.isfinite(grown) and grown < 1.0 else None
 
 
-def summary(solved: Simulation) -> dict[str, Any]:
+def simulation_json(solved: Simulation) -> dict[str, Any]:
     """Return a simulation as the JSON of ``springmass simulate``."""
     solution, check, band = solved.solution, solved.check, solved.band
     content = {
@@ -494,14 +492,14 @@ def summary(solved: Simulation) -> dict[str, Any]:
         "prediction": prediction(solved),
         "equation": picked(solved.problem.equation, solved.problem.equation.__slots__),
         "effects": [picked(each, EFFECT_COLUMNS) for each in solved.effects],
-        "against": None if solved.against is None else solved.against.summary(),
-        "band": None if band is None else _band_summary(band, solved.trajectory.t),
+        "against": None if solved.against is None else against_json(solved.against),
+        "band": None if band is None else _band_json(band, solved.trajectory.t),
         "growth": [picked(each, GROWTH_COLUMNS) for each in solved.growths],
     }
     return {name: plain(value) for name, value in content.items()}
 
 
-def _band_summary(band: Band, t: F8) -> dict[str, Any]:
+def _band_json(band: Band, t: F8) -> dict[str, Any]:
     """Return the band as JSON; each half-width is the largest of the run."""
     around, (_, of_amplitude) = band.displacement_at(t), band.amplitude_at(t)
     widths = {

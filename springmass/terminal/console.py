@@ -5,8 +5,6 @@ full. Other threads therefore put their lines into a queue and continue, and onl
 writes are counted, and the end waits at most a second for the thread.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import threading

@@ -1,7 +1,5 @@
 """Put marks into a recording by keys: the space bar alone, or text with Enter."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import select

@@ -1,7 +1,5 @@
 """Format Table 1, findings, comparisons and the classic method's numbers as text for a terminal or a pipe."""
 
-from __future__ import annotations
-
 import shutil
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
@@ -21,7 +19,6 @@ _MARKS = {"error": "ERROR  ", "warning": "warning", "info": "note   "}
 RUNS_NAMED = 5  # maximum number of runs that a line names
 WARNINGS_SHOWN = 3  # number of warnings shown without --full
 NARROW = 80  # maximum width of wrapped warnings, columns
-WARNING_LINES = 3
 OPTION_OF_MASS = ": --mass-kg KG"
 FINDING_INDENT = " " * 8
 
@@ -54,16 +51,12 @@ def findings_text(
 
 
 def _finding_line(finding: Mapping[str, Any], written: Callable[[str], str]) -> str:
-    """Return severity, code, message and advice in at most three lines, but an error in full."""
+    """Return severity, code, message and advice."""
     severity, advice = finding["severity"], finding.get("advice", "")
     message = written(finding["message"])
     if advice and severity != "info":
         message += f"{'' if message[-1:] in '.!?' else '.'} {with_options(finding['code'], advice)}"
-    lines = wrapped(f"{_MARKS[severity]} {finding['code']}: {message}", FINDING_INDENT, NARROW).splitlines()
-    if severity == "error" or len(lines) <= WARNING_LINES:
-        return "\n".join(lines)
-    last = lines[WARNING_LINES - 1]
-    return "\n".join([*lines[: WARNING_LINES - 1], f"{last[: NARROW - 4].rstrip(' .,;')} ..."])
+    return wrapped(f"{_MARKS[severity]} {finding['code']}: {message}", FINDING_INDENT, NARROW)
 
 
 def option_of(name: str) -> str:

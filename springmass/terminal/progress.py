@@ -1,7 +1,5 @@
 """Show the progress of a long task on stderr: a temporary bar on a terminal, elsewhere optional lines."""
 
-from __future__ import annotations
-
 import contextlib
 import logging
 import sys

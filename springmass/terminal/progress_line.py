@@ -1,7 +1,5 @@
 """Show a recording on stderr: a few lines rewritten in place on a terminal, occasional lines elsewhere."""
 
-from __future__ import annotations
-
 from springmass.runs.rolling import NotYet
 from springmass.session.live_state import Progress, TroubleKind
 from springmass.terminal.console import Console

@@ -1,7 +1,5 @@
 """What a stream can show: terminal or pipe, characters, width; and quantities in its characters."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass
 from typing import TextIO

@@ -1,7 +1,5 @@
 """The conformance suite for what another package adds: a sensor, a format, a damping law or an integrator."""
 
-from __future__ import annotations
-
 from itertools import product
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The rules for a format of recordings, with files of known content that an example writes."""
 
-from __future__ import annotations
-
 import codecs
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

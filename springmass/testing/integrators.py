@@ -1,7 +1,5 @@
 """The rules for an integrator, on problems that it can solve."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The rules for a damping law, at parameters (p,) and times (n,) in s."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from itertools import product
 

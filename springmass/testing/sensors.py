@@ -1,7 +1,5 @@
 """The rules for a family of rangefinders, whose encoder is written from the data sheet and checks its decoder."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Sequence

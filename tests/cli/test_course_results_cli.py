@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from springmass.cli import main
-from springmass.course.results_csv import write_rows
+from springmass.course.results_csv import write_results
 from tests.courses import faulty_course, write_recording
 
 K, SPRING_KG, DIAMETER_M, RHO = 14.0, 0.010, 0.102, 1.199  # N/m, kg, m, kg/m3
@@ -140,7 +140,7 @@ def bench_rows(spread: float, exchanged: tuple[str, str], *, runs_of_bench: int)
 def suspects_of(cli, folder: Path, rows: list[dict[str, object]]) -> dict[str, str]:
     """Compare rows as the results of a course; return what is said about each suspect, which no mean includes."""
     folder.mkdir()
-    write_rows(folder, rows, ["group"])
+    write_results(folder, rows, ["group"])
     compared = json.loads(cli("compare", folder, "--json").out)
     assert compared["disagreements"] == []
     assert compared["agreements"][0]["runs"] == len(rows) - len(compared["suspects"])

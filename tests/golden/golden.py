@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 import re
-import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,11 +41,6 @@ class Move:
         shift = "" if self.of_u is None else f"  {self.of_u:+.3g} u"
         shift += "" if self.of_itself is None else f"  {100.0 * self.of_itself:+.3g} %"
         return f"  {self.quantity}: {self.before} -> {self.after}{shift}"
-
-
-def joined(words: list[str]) -> str:
-    """Return a command line as it is written in the files."""
-    return " ".join(word if re.fullmatch(r"[^\s'\"\\]+", word) else shlex.quote(word) for word in words)
 
 
 def parsed(text: str) -> Goldens:

@@ -11,7 +11,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page
 
-from springmass.report.html import script_sha256
+from springmass.charts.browser import script_sha256
 from tests.pages.conftest import OUTSIDE, WIDTHS
 from tests.sampling import sampled
 

@@ -101,16 +101,6 @@ def test_numbers_are_those_of_the_command_line(client: tuple[WindowClient, Path]
     window.do("remove", card=card["id"])
 
 
-def test_recordings_dropped_together_are_all_read(client: tuple[WindowClient, Path]) -> None:
-    """Each by a process of its own."""
-    window, _ = client
-    assert window.drop({f"{name}.txt": tracker() for name in "ab"}, "two")[0] == 200
-    cards = window.cards()
-    assert [card["stage"] for card in cards] == ["question"] * 2
-    for card in cards:
-        window.do("remove", card=card["id"])
-
-
 def test_what_is_dropped_is_for_its_user_alone(client: tuple[WindowClient, Path]) -> None:
     """The folder has the mode 0700, and so has every folder in it; no name of a file leads out of it."""
     window, folder = client
@@ -231,7 +221,7 @@ def apart(work: Coroutine[Any, Any, Any]) -> Any:
         return pool.submit(asyncio.run, work).result()
 
 
-def asked(limit_s: float) -> list[dict[str, Any]]:
+def asked(limit_s: float, into: Path) -> list[dict[str, Any]]:
     """Ask a process of the window for two minutes of a recording."""
 
     async def ask() -> list[dict[str, Any]]:
@@ -239,20 +229,20 @@ def asked(limit_s: float) -> list[dict[str, Any]]:
         path = str(springmass.sample_data() / "damped_simulated_position.txt")
         card = {**BLANK, "name": "x", "path": path}
         try:
-            return [answer async for answer in child.ask({"do": "show", "card": card, "into": os.devnull}, limit_s)]
+            return [answer async for answer in child.ask({"do": "show", "card": card, "into": str(into)}, limit_s)]
         finally:
             child.end()
 
     return apart(ask())
 
 
-def test_a_process_that_takes_too_long_or_too_much_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_process_that_takes_too_long_or_too_much_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Both are measured from outside; the line says what to do."""
     with pytest.raises(processes.ProcessEnded, match=r"took longer than 0 s; export"):
-        asked(0.01)
+        asked(0.01, tmp_path / "x")
     monkeypatch.setattr(processes, "MOST_MEMORY", 1 << 20)
     with pytest.raises(processes.ProcessEnded, match="of memory; export"):
-        asked(60.0)
+        asked(60.0, tmp_path / "x")
 
 
 def test_the_server_ends_when_its_pages_are_gone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -261,7 +251,7 @@ def test_the_server_ends_when_its_pages_are_gone(tmp_path: Path, monkeypatch: py
 
     async def ends(pages: int, recording: bool) -> bool:
         cards = Cards(tmp_path)
-        monkeypatch.setattr(served, "prepare", lambda: None)
+        monkeypatch.setattr(cards.children, "prepare", lambda: None)
         monkeypatch.setattr(type(cards.recorder), "running", recording)
         window, over = served.Window(cards), asyncio.Event()
         window.pages, window.quiet_s = pages, 0.0

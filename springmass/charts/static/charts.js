@@ -327,34 +327,32 @@ function shifted([low, high], [first, last], action) {
   return [low + by, high + by];
 }
 
+// An element with text, or with parts, which are elements and texts, and with properties and data.
+function element(name, content = "", more = {}) {
+  const made = document.createElement(name), { dataset, ...fields } = more;
+  made.append(...(Array.isArray(content) ? content : [content]));
+  Object.assign(made, fields);
+  Object.assign(made.dataset, dataset || {});
+  return made;
+}
 function makeButton(words, act, name) {
-  const button = document.createElement("button");
-  button.type = "button";
-  button.textContent = words;
-  if (name) button.title = button.ariaLabel = name;
+  const button = element("button", words, { type: "button", ...(name && { title: name, ariaLabel: name }) });
   button.addEventListener("click", (event) => act(button, event));
   return button;
 }
+const makeBox = (name, parent) => parent.appendChild(element("div", "", { className: name }));
 // Copy a text to the clipboard, even from a page that was opened from the disk.
 async function copyText(text) {
   if (navigator.clipboard && isSecureContext) {
     try { await navigator.clipboard.writeText(text); return true; } catch { /* not allowed: use execCommand below */ }
   }
-  const area = document.createElement("textarea");
-  area.value = text;
+  const area = element("textarea", "", { value: text });
   area.style.cssText = "position: fixed; opacity: 0;";
   document.body.append(area);
   area.select();
   const done = document.execCommand("copy");
   area.remove();
   return done;
-}
-
-function makeBox(name, parent) {
-  const box = document.createElement("div");
-  box.className = name;
-  parent.append(box);
-  return box;
 }
 
 // Entries of each panel's legend, each label once; a single series needs none, and a panel that shows nothing else than
@@ -396,8 +394,7 @@ class Chart {
     this.bar = makeBox("bar", box);
     this.bar.setAttribute("role", "toolbar");
     this.bar.ariaLabel = "zoom and view";
-    this.value = document.createElement("output");
-    this.value.className = "value";
+    this.value = element("output", "", { className: "value" });
     this.hint = this.value.textContent = matchMedia("(hover: none)").matches ? "Tap: read a value. Buttons: zoom and move." : "Drag: zoom. Shift and drag: move. Double-click: all.";
     const group = { left: 0 }, more = { hidden: this.hidden, group, joined: false, keep: true };
     this.legends = [];
@@ -449,8 +446,7 @@ class Chart {
   // An entry of a legend is a button that hides and shows its series.
   entry(entry) {
     const button = this.toggle(entry.label, !this.hidden.has(entry.label), (on) => { if (on) this.hidden.delete(entry.label); else this.hidden.add(entry.label); this.redraw(); });
-    const key = document.createElement("canvas"), px = devicePixelRatio;
-    [key.width, key.height] = [24 * px, 12 * px];
+    const px = devicePixelRatio, key = element("canvas", "", { width: 24 * px, height: 12 * px });
     drawKey(key.getContext("2d"), entry, 0, 6 * px, px);
     button.prepend(key);
     return button;
@@ -509,10 +505,8 @@ class Chart {
   }
 
   async save() {
-    const link = document.createElement("a"), canvas = await paper(this.chart, 720, 4, this);
-    link.href = canvas.toDataURL("image/png");
-    link.download = `${this.chart.file || this.chart.name}.png`;
-    link.click();
+    const canvas = await paper(this.chart, 720, 4, this);
+    element("a", "", { href: canvas.toDataURL("image/png"), download: `${this.chart.file || this.chart.name}.png` }).click();
   }
 }
 

@@ -27,9 +27,7 @@ function begin() {
   document.documentElement.classList.add("live");
   for (const figure of figures) {
     whenSeen(figure, () => {
-      const box = document.createElement("div");
-      box.className = "chart";
-      box.id = `${figure.id}-chart`;
+      const box = element("div", "", { className: "chart", id: `${figure.id}-chart` });
       figure.prepend(box);
       DRAWN.set(figure, new Chart(box, charts[figure.dataset.chart]));
     });

@@ -33,13 +33,7 @@ function question(title, fields, ok) {
   $("ask-ok").textContent = ok || "OK";
   $("ask-error").hidden = true;
   checks = Object.fromEntries(fields.map(([name, , , check]) => [name, check || String]));
-  $("ask-fields").replaceChildren(...fields.map(([name, text, value]) => {
-    const box = document.createElement("label"), input = document.createElement("input");
-    input.name = name;
-    input.value = value;
-    box.append(text, input);
-    return box;
-  }));
+  $("ask-fields").replaceChildren(...fields.map(([name, text, value]) => element("label", [text, element("input", "", { name, value })])));
   $("ask").showModal();
   const first = $("ask-fields").querySelector("input");
   if (first) first.select(); else $("ask-ok").focus();
@@ -154,11 +148,9 @@ const ACTIONS = {
     const [from, end] = in_view(), all = samples[0];
     let text = `time_s,${run.quantity === "length" ? "distance_m" : `${run.quantity}_${run.unit}`}\n`;
     for (let i = all.at(from); i < all.count && all.t[i] <= end; i++) text += `${all.t[i]},${Number.isNaN(all.y[i]) ? "" : all.y[i]}\n`;
-    const link = document.createElement("a");
-    link.href = URL.createObjectURL(new Blob([text], { type: "text/csv" }));
-    link.download = `${run.name.replace(/\.[^.]*$/, "")}-view.csv`;
-    link.click();
-    URL.revokeObjectURL(link.href);
+    const href = URL.createObjectURL(new Blob([text], { type: "text/csv" }));
+    element("a", "", { href, download: `${run.name.replace(/\.[^.]*$/, "")}-view.csv` }).click();
+    URL.revokeObjectURL(href);
     say("Samples in view saved as CSV");
   },
   share() {

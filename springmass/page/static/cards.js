@@ -1,13 +1,6 @@
 "use strict";
 // A card: one recording with its questions, its bench, its results. Every text from a file becomes a text node.
 
-function element(name, content = "", more = {}) {
-  const made = document.createElement(name), { dataset, ...fields } = more;
-  made.append(...(Array.isArray(content) ? content : [content]));
-  Object.assign(made, fields);
-  Object.assign(made.dataset, dataset || {});
-  return made;
-}
 const row = (cells, of = "td") => element("tr", cells.map((cell) => (["TD", "TH"].includes(cell.tagName) ? cell : element(of, cell))));
 function choices(select, items, value) {
   select.replaceChildren(...items.map(({ value: each, label }) => element("option", label, { value: each })));

@@ -127,12 +127,7 @@ function after(at) {
   return "";
 }
 
-function item(text, kind) {
-  const found = document.createElement("li");
-  found.textContent = text;
-  if (kind) found.className = kind;
-  return found;
-}
+const item = (text, kind = "") => element("li", text, { className: kind });
 
 // Prevents a phone from turning its screen off; browsers allow this only over HTTPS and on this computer.
 let awake = null;

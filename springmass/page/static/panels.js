@@ -58,12 +58,11 @@ function show_motion() {
   $("why").textContent = motion.why || "";
   const estimates = motion.estimates || {};
   $("estimates").replaceChildren(...Object.keys(LABELS).filter((name) => estimates[name]).map((name) => {
-    const group = pair(label_of(name) + (OF_LAW.has(name) && motion.stated_law ? `, law ${motion.stated_law}` : ""), short(estimates[name])), detail = group.lastChild, age = document.createElement("span");
+    const group = pair(label_of(name) + (OF_LAW.has(name) && motion.stated_law ? `, law ${motion.stated_law}` : ""), short(estimates[name])), detail = group.lastChild;
     detail.title = estimates[name].text;
     group.dataset.name = name;
     group.dataset.t = estimates[name].t_s || motion.t_s;
-    age.className = "age";
-    detail.append(age);
+    detail.append(element("span", "", { className: "age" }));
     return group;
   }));
   show_ages();
@@ -114,8 +113,7 @@ function show_chart(shown, chart) {
 // The names of a panel's series under it.
 function name_series(chart) {
   const names = legendsOf({ panels: [chart.panel] }, isDark(chart.box))[0].map((entry) => {
-    const found = item(entry.label), key = document.createElement("canvas");
-    [key.width, key.height] = [24, 12];
+    const found = item(entry.label), key = element("canvas", "", { width: 24, height: 12 });
     drawKey(key.getContext("2d"), entry, 0, 6, 1);
     found.prepend(key, " ");
     return found;

@@ -66,13 +66,7 @@ function statistics({ from, to }) {
   return { n, mean, deviation: n > 1 ? Math.sqrt(yy / (n - 1)) : NaN, least, most, slope: tt > 0 ? ty / tt : NaN };
 }
 
-function pair(term_text, detail_text) {
-  const group = document.createElement("div"), term = document.createElement("dt"), detail = document.createElement("dd");
-  term.textContent = term_text;
-  detail.textContent = signed(detail_text);
-  group.append(term, detail);
-  return group;
-}
+const pair = (term, detail) => element("div", [element("dt", term), element("dd", signed(detail))]);
 
 function show_selection() {
   $("region").hidden = !selection;
@@ -94,13 +88,8 @@ function show_region_fits() {
   const names = Object.keys(LABELS).filter((name) => part[name]);
   $("region-fits").hidden = !names.length;
   $("region-estimates").replaceChildren(...names.map((name) => {
-    const row = document.createElement("tr"), head = document.createElement("th");
-    head.scope = "row";
-    head.textContent = name === "amplitude_now" ? "amplitude at the end" : LABELS[name];
-    const cells = [part, whole].map((from) => { const cell = document.createElement("td"); cell.textContent = from[name] ? short(from[name]) : ""; return cell; });
-    row.dataset.name = name;
-    row.append(head, ...cells);
-    return row;
+    const head = element("th", name === "amplitude_now" ? "amplitude at the end" : LABELS[name], { scope: "row" });
+    return element("tr", [head, ...[part, whole].map((from) => element("td", from[name] ? short(from[name]) : ""))], { dataset: { name } });
   }));
 }
 

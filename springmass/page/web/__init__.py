@@ -1,1 +1,1 @@
-"""The page on the network: its server, and the rights to view and to act."""
+"""The bench page and the window on the network: their servers, and the rights to view and to act."""

@@ -19,7 +19,7 @@ from starlette.requests import HTTPConnection
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from springmass.report.html import script_sha256
+from springmass.charts.browser import script_sha256
 
 VIEW, ACT = "view", "act"
 """Rights of a request; the controller has both."""

@@ -14,7 +14,8 @@ from typing import Any
 
 import uvicorn
 from starlette.applications import Starlette
-from starlette.responses import FileResponse, HTMLResponse, PlainTextResponse, Response
+from starlette.exceptions import HTTPException
+from starlette.responses import FileResponse, HTMLResponse, Response
 from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -202,21 +203,18 @@ def application(page: PageState, share: str = "", polled: Callable[[int], None] 
     """
     server = Server(page, share, polled)
 
-    async def main(_: Any) -> Response:
-        return page_of("page")
-
-    async def report(_: Any) -> Response:
+    def report(_: Any) -> Response:
         if page.after is None or page.after.report is None:
-            return PlainTextResponse("springmass: no report has been made; the page makes one on O\n", 404)
+            raise HTTPException(404, "springmass: no report has been made; the page makes one on O\n")
         return FileResponse(page.after.report, media_type="text/html")
 
-    async def code(_: Any) -> Response:
+    def code(_: Any) -> Response:
         if not share:
-            return PlainTextResponse("springmass: the page is not open to viewers; --lan opens it\n", 404)
+            raise HTTPException(404, "springmass: the page is not open to viewers; --lan opens it\n")
         return Response(code_svg(share), media_type="image/svg+xml")
 
     routes = [
-        Route("/", main),
+        Route("/", lambda _: page_of("page")),
         Route(REPORT, report),
         Route("/v2/code.svg", code),
         WebSocketRoute("/v2/run", server.attend),
@@ -227,15 +225,11 @@ def application(page: PageState, share: str = "", polled: Callable[[int], None] 
 
 def static_files() -> list[BaseRoute]:
     """Return the routes of the files that never change: those of the page and of all charts."""
-
-    async def looks(_: Any) -> Response:
-        return Response(looks_script(), media_type="text/javascript")
-
-    async def report_style(_: Any) -> Response:
-        return Response(page_style(), media_type="text/css")
-
-    files = StaticFiles(directory=PAGE_FILES, packages=[(charts.__name__, "static")])
-    return [Route("/static/looks.js", looks), Route("/static/report.css", report_style), Mount("/static", files)]
+    return [
+        Route("/static/looks.js", lambda _: Response(looks_script(), media_type="text/javascript")),
+        Route("/static/report.css", lambda _: Response(page_style(), media_type="text/css")),
+        Mount("/static", StaticFiles(directory=PAGE_FILES, packages=[(charts.__name__, "static")])),
+    ]
 
 
 def serve(

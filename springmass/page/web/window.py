@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
+from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
@@ -21,7 +22,6 @@ from springmass.loading.load import sample_data
 from springmass.page.web.security import ACT, Access
 from springmass.page.web.server import page_of, server_of, static_files
 from springmass.page.window.cards import Cards, NotTaken, checked
-from springmass.page.window.processes import prepare
 from springmass.page.window.recording import ports
 
 DESERTED_S, FIRST_S = 60.0, 600.0
@@ -29,6 +29,8 @@ DESERTED_S, FIRST_S = 60.0, 600.0
 LONGEST_REQUEST = 1 << 18
 OWN_HEADER = ("x-springmass", "window")
 """A header that no page of another origin can send without being asked first, and the answer to that is no."""
+MALFORMED = (KeyError, TypeError, ValueError, AttributeError, RecursionError)
+"""What a request raises that does not have the form of one."""
 TAKEN = {name: f"report/{name}" for name in ("results.csv", "amplitude.csv", "table.tex", "results.json")} | {
     name: name for name in ("figures.zip", "run.h5")
 }
@@ -42,7 +44,7 @@ ACTIONS: Mapping[str, Callable[[Cards, str, Mapping[str, Any]], Any]] = {
     "stop": lambda cards, card, _: cards.children.forget(card, "You stopped it"),
     "remove": lambda cards, card, _: cards.remove(card),
     "write": lambda cards, card, asked: cards.write(card, str(asked["what"])),
-    "judge": lambda cards, card, asked: cards.of_card(card, "judge", rows=checked("rows", asked["rows"])),
+    "judge": lambda cards, card, asked: cards.of_card(card, "judge", **checked({"rows": asked["rows"]})),
     "compare": lambda cards, _, asked: cards.compare(asked),
     "ports": lambda *_: ports(),
     "record": lambda cards, _, asked: cards.record(asked),
@@ -60,16 +62,54 @@ class Window:
         self._cards, self.pages = cards, 0
         self.quiet_s = DESERTED_S - FIRST_S
 
-    async def do(self, asked: Mapping[str, Any]) -> Response:
+    def application(self, life: Callable[[Starlette], Any]) -> Starlette:
+        """Return the window as an ASGI application without access control."""
+        routes = [
+            Route("/", lambda _: page_of("window")),
+            Route("/window/files", self.receive, methods=["POST"]),
+            Route("/window/do", self.do, methods=["POST"]),
+            Route("/window/cards/{card}/{what}", self.taken),
+            WebSocketRoute("/window/events", self.attend),
+            *static_files(),
+        ]
+        answers: dict[Any, Any] = {NotTaken: lambda _, error: JSONResponse({"refused": str(error)}, 409)}
+        malformed = JSONResponse({"refused": "the window takes no such request"}, 400)
+        answers |= dict.fromkeys(MALFORMED, lambda *_: malformed)
+        return Starlette(routes=routes, lifespan=life, exception_handlers=answers)
+
+    async def receive(self, request: Request) -> Response:
+        """Take a file of a drop."""
+        demand_own(request)
+        drop, folder, name = (request.query_params[each] for each in ("drop", "folder", "name"))
+        await self._cards.receive(drop, folder, name, request.stream())
+        return JSONResponse({})
+
+    async def do(self, request: Request) -> Response:
         """Carry out what a page asks, and answer with the file that was made, or with what was found."""
+        demand_own(request)
+        content = b""
+        async for data in request.stream():
+            content += data
+            if len(content) > LONGEST_REQUEST:
+                raise ValueError
+        asked = json.loads(content)
         act = ACTIONS.get(str(asked.get("do")))
         if act is None:
             raise NotTaken("the window does no such thing")
         done = act(self._cards, str(asked.get("card", "")), asked)
         found = await done if inspect.isawaitable(done) else done
-        return (
-            FileResponse(found, media_type="application/json") if isinstance(found, Path) else JSONResponse(found or {})
-        )
+        if isinstance(found, Path):
+            return FileResponse(found, media_type="application/json")
+        return JSONResponse(found or {})
+
+    async def taken(self, request: Request) -> Response:
+        """Answer with a file of a card, to show or to take away."""
+        card, what = self._cards.cards.get(request.path_params["card"]), request.path_params["what"]
+        if card is None or not (path := card.folder / (TAKEN | SHOWN).get(what, "nothing")).is_file():
+            raise HTTPException(404, "springmass: this has not been made yet, or was removed\n")
+        if what in SHOWN:
+            return FileResponse(path)
+        return FileResponse(path, filename=f"{Path(card.kept['name']).stem}{'.h5' if what == 'run.h5' else f'-{what}'}")
 
     async def attend(self, browser: WebSocket) -> None:
         """Send a page everything, and then what changes; it is gone when its connection closes."""
@@ -96,7 +136,7 @@ class Window:
 
     async def reading(self, over: Callable[[], None]) -> None:
         """Call ``over`` once no page has been there for a while and nothing is recorded."""
-        prepare()
+        self._cards.children.prepare()
         while True:
             await asyncio.sleep(1.0)
             busy = self._cards.look()
@@ -105,67 +145,11 @@ class Window:
                 over()
 
 
-def application(window: Window, cards: Cards, life: Callable[[Starlette], Any]) -> Starlette:
-    """Return the window as an ASGI application without access control."""
-
-    async def main(_: Request) -> Response:
-        return page_of("window")
-
-    async def changing(request: Request, work: Callable[[], Any]) -> Response:
-        """Do what changes something only for the page itself: its cookie, its origin and its header."""
-        owns = ACT in request.auth.scopes and "origin" in request.headers
-        if not owns or request.headers.get(OWN_HEADER[0]) != OWN_HEADER[1]:
-            return PlainTextResponse("springmass: only the window itself may change something\n", 403)
-        try:
-            done: Response = await work()
-        except NotTaken as error:
-            return JSONResponse({"refused": str(error)}, 409)
-        except (KeyError, TypeError, ValueError, AttributeError, RecursionError):
-            return JSONResponse({"refused": "the window takes no such request"}, 400)
-        return done
-
-    async def receive(request: Request) -> Response:
-        async def work() -> Response:
-            drop, folder, name = (request.query_params[each] for each in ("drop", "folder", "name"))
-            await cards.receive(drop, folder, name, request.stream())
-            return JSONResponse({})
-
-        return await changing(request, work)
-
-    async def do(request: Request) -> Response:
-        async def work() -> Response:
-            content = b""
-            async for data in request.stream():
-                content += data
-                if len(content) > LONGEST_REQUEST:
-                    raise ValueError
-            return await window.do(json.loads(content))
-
-        return await changing(request, work)
-
-    async def taken(request: Request) -> Response:
-        try:
-            card = cards.card(request.path_params["card"])
-        except NotTaken as error:
-            return PlainTextResponse(f"springmass: {error}\n", 404)
-        what = request.path_params["what"]
-        path = card.folder / (TAKEN | SHOWN).get(what, "nothing")
-        if not path.is_file():
-            return PlainTextResponse("springmass: this has not been made yet\n", 404)
-        if what in SHOWN:
-            return FileResponse(path)
-        stem, end = Path(card.kept["name"]).stem, what.replace("run.", ".") if what == "run.h5" else f"-{what}"
-        return FileResponse(path, filename=f"{stem}{end}")
-
-    routes = [
-        Route("/", main),
-        Route("/window/files", receive, methods=["POST"]),
-        Route("/window/do", do, methods=["POST"]),
-        Route("/window/cards/{card}/{what}", taken),
-        WebSocketRoute("/window/events", window.attend),
-        *static_files(),
-    ]
-    return Starlette(routes=routes, lifespan=life)
+def demand_own(request: Request) -> None:
+    """Refuse a request that is not of the page itself, with its cookie, its origin and its header."""
+    owns = ACT in request.auth.scopes and "origin" in request.headers
+    if not owns or request.headers.get(OWN_HEADER[0]) != OWN_HEADER[1]:
+        raise HTTPException(403, "springmass: only the window itself may change something\n")
 
 
 def serve_window(cards: Cards, begin: Callable[[], None], *, port: int, opened: Callable[[str, str], None]) -> None:
@@ -189,5 +173,5 @@ def serve_window(cards: Cards, begin: Callable[[], None], *, port: int, opened: 
                 cards.close()
 
         # A page whose computer sleeps does not answer, and is not gone.
-        server = server_of(application(window, cards, life), access, ping_s=None)
+        server = server_of(window.application(life), access, ping_s=None)
         server.run(sockets=[listener])

@@ -12,8 +12,9 @@ import shutil
 import time
 from collections.abc import AsyncIterator, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import msgspec
 from platformdirs import user_state_path
 
 from acquisition.units import MEASURES, TIMES
@@ -28,7 +29,6 @@ MOST_OF_FILE, MOST_TOGETHER, MOST_FILES = 200_000_000, 1_000_000_000, 200
 KEPT_S = 24 * 3600.0
 ALIVE_S = 60.0
 """A window whose folder was not touched for so long has ended; it touches it every second."""
-LONGEST_NOTE = 4000
 SETTLED = ("done", "question", "failed")
 """Stages of a card that wait for a person."""
 _UNSET = dict.fromkeys(("velocity", "scene", "from_s", "to_s", "law", "accuracy"))
@@ -192,7 +192,7 @@ class Cards:
         for each in [key for key in self._drops if key[0] == drop]:
             del self._drops[each]
         dropped = [kept for place in places for kept in _recordings(place)]
-        scenes = [path for place in places for path in place.glob("*.toml") if not _is_note(path)]
+        scenes = [path for place in places for path in place.glob("*.toml") if not path.name.endswith(".about.toml")]
         stated, refused = None, ""
         if len(scenes) > 1:
             refused = f"{len(scenes)} scenes were dropped and none is used; drop one of them on its recording"
@@ -251,7 +251,7 @@ class Cards:
         Answers and cells of the bench replace those of their name alone: a page may not have seen the last change yet.
         """
         card = self.card(wanted)
-        taken = {name: checked(name, value) for name, value in changes.items()}
+        taken = checked(changes)
         for name in {"answers", "bench"} & taken.keys():
             taken[name] = {each: text for each, text in (card.kept[name] | taken[name]).items() if text}
         card.kept |= taken | {"saved": False}
@@ -301,7 +301,7 @@ class Cards:
         """Compare cards; return the file with the comparison."""
         cards = [self.card(each) for each in request["cards"]]
         asked = {"do": "compare", "cards": [card.kept for card in cards], "into": str(self.folder)}
-        asked |= {name: checked(name, request[name]) for name in ("hooke", "columns")}
+        asked |= checked({name: request[name] for name in ("hooke", "columns")})
         await self.ask("together", asked, sum(card.size for card in cards))
         return self.folder / "comparison.json"
 
@@ -409,10 +409,6 @@ class Cards:
         return [order, self._recorder, *(card.message() for card in self.cards.values() if card.revision > revision)]
 
 
-def _is_note(path: Path) -> bool:
-    return path.name.endswith(".about.toml")
-
-
 def _recordings(folder: Path) -> Iterator[dict[str, Any]]:
     """Yield what a card needs to open each recording of a folder."""
     paths = [path for path in sorted(folder.iterdir()) if path.is_file() and not path.name.startswith(".")]
@@ -439,25 +435,21 @@ def _joined(answer: Mapping[str, Any]) -> str:
     return f"{problem}. {remedy}." if remedy else f"{problem}."
 
 
-def checked(name: str, value: Any) -> Any:
-    """Return what a page sent if it has the form of this field; NotTaken for anything else."""
-    match name, value:
-        case "from_s" | "to_s", float() | int() | None:
-            return value
-        case "law" | "accuracy", str() | None:
-            return value or None
-        case "notes", str():
-            return value[:LONGEST_NOTE]
-        case "answers", dict() if all(isinstance(each, str) and len(each) < LONGEST_NOTE for each in value.values()):
-            return value
-        case "bench", dict() if all(isinstance(each, dict) for each in value.values()):
-            cells = (text for each in value.values() for text in each.values())
-            if all(isinstance(text, str) and len(text) < 100 for text in cells):
-                return value
-        case "scene", dict() | None:
-            return value
-        case "rows" | "hooke", list() if all(isinstance(row, list) and len(row) < 8 for row in value):
-            return [[str(cell)[:100] for cell in row] for row in value[:1000]]
-        case "columns", list():
-            return [str(cell)[:100] for cell in value[:8]]
-    raise NotTaken(f"the window takes no such {name}")
+ShortText = Annotated[str, msgspec.Meta(max_length=100)]
+LongText = Annotated[str, msgspec.Meta(max_length=4000)]
+FORMS: Mapping[str, Any] = {
+    **dict.fromkeys(("from_s", "to_s"), float | None),
+    **dict.fromkeys(("law", "accuracy"), ShortText | None),
+    "notes": LongText,
+    "answers": dict[str, LongText],
+    "bench": dict[str, dict[str, ShortText]],
+    "scene": dict[str, Any] | None,
+    **dict.fromkeys(("rows", "hooke"), list[list[ShortText]]),
+    "columns": list[ShortText],
+}
+"""The form of each field that a page sends."""
+
+
+def checked(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a page sent; KeyError or ValueError if a field is none of its own, or has another form."""
+    return {name: msgspec.convert(value, FORMS[name]) for name, value in fields.items()}

@@ -30,7 +30,7 @@ from acquisition.recordings.reading import value_of
 from pipeline.bench.scene import Scene
 from springmass.charts.draw import save
 from springmass.charts.run import charts_of
-from springmass.charts.several import comparison, masses, overlay, static
+from springmass.charts.several import static
 from springmass.comparing.comparison import compare_runs
 from springmass.comparing.reported import REPORTED_COLUMNS, judge, read_reported
 from springmass.comparing.user_table import read_hooke
@@ -40,7 +40,7 @@ from springmass.loading.scenes import read_scene
 from springmass.page.window.bench import form_of, scene_of
 from springmass.page.window.contents import asked, compared_of, drawn, judged, opened, results_of
 from springmass.report.recorded import notes_of
-from springmass.report.write import write_report
+from springmass.report.write import charts_across, write_report
 from springmass.result.output_names import numbered, plain_name
 from springmass.runs.run import Run
 from springmass.runs.tasks import Failed, Task, attempted
@@ -127,10 +127,7 @@ class Opened:
             raise ProgramError("a comparison needs the mass of every bob", "type it on its card")
         if len(runs) > 1:
             compared = compare_runs(runs, static=points)
-            parts = [overlay(names, [run.analysis for run in runs]), comparison(compared.comparison)]
-            parts.append(None if compared.line is None else masses(compared.line))
-            parts.append(None if compared.hooke is None else static(compared.hooke))
-            found = compared_of(compared, {chart.name: chart for chart in parts if chart is not None})
+            found = compared_of(compared, charts_across(runs, compared))
         elif points is not None:
             line = static(read_hooke(points))
             found = {"verdict": line.caption, "rows": [], "findings": [], "charts": drawn({"hooke": line})}

@@ -10,12 +10,12 @@ from acquisition.recordings.identify import get_format
 from acquisition.recordings.questions import Missing, MissingItem
 from springmass.charts.chart import Chart, to_json
 from springmass.charts.run import charts_of, recording
-from springmass.comparing.comparison import SpringComparison, comparison_words
+from springmass.comparing.comparison import SpringComparison
 from springmass.comparing.reported import Reported
 from springmass.loading.loaded import Loaded
 from springmass.report.html import SYMBOL_WITH_INDEX, tables_of
 from springmass.report.recorded import date_words, notes_of
-from springmass.report.words import summary
+from springmass.report.words import summary, verdict
 from springmass.result.advice import notices_of, sentence
 from springmass.runs.run import Run
 from springmass.typeset import cells, pretty, typeset
@@ -117,9 +117,8 @@ def compared_of(compared: SpringComparison, charts: Mapping[str, Chart]) -> dict
     rows = [[name, pretty(k), f"{pull:+.1f}".replace("-", "−")] for name, k, pull in each]
     if springs.agree:
         rows.append(["weighted mean", pretty(springs.spring_constant), ""])
-    texts = [springs.message, *comparison_words(compared), *(joint.message for joint in compared.joint)]
     return {
-        "verdict": typeset(" ".join(texts)),
+        "verdict": " ".join([*verdict(compared), *(typeset(joint.message) for joint in compared.joint)]),
         "rows": rows,
         "findings": [finding.advice for finding in compared.findings if finding.advice],
         "charts": drawn(charts),

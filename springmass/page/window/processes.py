@@ -21,22 +21,14 @@ MOST_MEMORY = 1 << 30
 MEASURED_EVERY_S = 0.1
 WORKING, IDLE = 2, 4
 """Processes that work at the same time, and those that keep the recording of a card in between."""
-FORKS = sys.platform != "win32"
+FORKS = sys.platform == "linux"
+"""Elsewhere a fork may hang that is made after linear algebra, or there is none: each process imports by itself."""
 CONTEXT: Any = multiprocessing.get_context("forkserver" if FORKS else "spawn")
-"""How a process is started; where none can be forked, each imports what it needs by itself."""
 CONTEXT.set_forkserver_preload(["springmass.page.window.child"])
 
 
 class ProcessEnded(Exception):
     """A process that was ended, or that died; the message says why in one sentence, and then what to do."""
-
-
-def prepare() -> None:
-    """Have the first process import what an analysis needs, while nobody waits for it."""
-    if FORKS:
-        from multiprocessing.forkserver import ensure_running
-
-        ensure_running()
 
 
 class Child:
@@ -49,7 +41,8 @@ class Child:
 
     @classmethod
     async def start(cls) -> Child:
-        """Start a process."""
+        """Start a process; it imports what it needs while nobody waits for it."""
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # an analysis uses one; a fork is safe without others
         child = cls()
         await asyncio.to_thread(child._process.start)
         child._theirs.close()
@@ -72,7 +65,7 @@ class Child:
             await asyncio.to_thread(self._process.join)
         finally:
             guard.cancel()
-        if FORKS and self._process.exitcode == -signal.SIGPROF:
+        if sys.platform != "win32" and self._process.exitcode == -signal.SIGPROF:
             self._why = self._why or _too_long(longest_s)
         raise ProcessEnded(
             self._why or "Reading it ended early, perhaps for want of memory; export a shorter recording"
@@ -119,8 +112,14 @@ class Children:
 
     def __init__(self) -> None:
         self._children: dict[str, Child] = {}
+        self._spare: asyncio.Task[Child] | None = None
         self._free = asyncio.Semaphore(WORKING)
         self._turns: dict[str, asyncio.Lock] = {}
+
+    def prepare(self) -> None:
+        """Have a process ready for the next recording."""
+        if self._spare is None:
+            self._spare = asyncio.create_task(Child.start())
 
     async def ask(
         self, holder: str, request: Mapping[str, Any], size: int, begun: Callable[[], None] = lambda: None
@@ -128,8 +127,11 @@ class Children:
         """Yield the answers of the holder's process to a request about files of so many bytes, when it is its turn."""
         async with self._turns.setdefault(holder, asyncio.Lock()), self._free:
             begun()
-            child = self._children.pop(holder, None)
-            child = self._children[holder] = await Child.start() if child is None else child
+            if (child := self._children.pop(holder, None)) is None:
+                spare, self._spare = self._spare, None  # before the wait: the next card needs a process of its own
+                child = await (spare or Child.start())
+            self._children[holder] = child
+            self.prepare()
             try:
                 async for answer in child.ask(request, LONGEST_S + LONGEST_S_PER_MB * size * 1e-6):
                     yield answer

@@ -95,18 +95,6 @@ def said_of_record(seed: int) -> tuple[Said, dict[str, float]]:
     return said, said.errors(record.truth)
 
 
-def frozen(outcomes: Iterable[tuple[Said, dict[str, float]]]) -> dict[str, np.ndarray]:
-    """Return what is kept of a release: per record the warnings, and per value u and whether it is sound and right."""
-    outcomes = list(outcomes)
-    return {
-        "warnings": np.array([" ".join(sorted(said.warnings)) for said, _ in outcomes]),
-        "u": np.array([[said.values[n].u if n in z else math.nan for n in JUDGED] for said, z in outcomes], np.float32),
-        "right": np.array(
-            [[n in z and said.values[n].sound and abs(z[n]) <= 3.0 for n in JUDGED] for said, z in outcomes]
-        ),
-    }
-
-
 @dataclass(frozen=True)
 class Bar:
     """A number that must lie within limits."""

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import springmass
-from tests.golden.golden import VALUES, parsed
 from tests.golden.inputs import RECORDINGS
 from tests.trials.grades.graded import Said, said_of
 
@@ -20,12 +19,6 @@ RELEASED = Path(__file__).with_name("released.txt")
 STAY = 0.95  # share of the values that stay sound
 JUDGED = {"period": "T", "amplitude": "A0", "spring_constant": "k"}
 SCENE = {"bob": {"mass_kg": {"value": 0.2, "u": 1e-4}}, "spring": {"mass_kg": {"value": 0.01, "u": 2e-4}}}
-
-
-def command_lines() -> list[str]:
-    """Return the command lines of the goldens that analyse a real recording at the standard accuracy."""
-    every = parsed((VALUES / "analyse-recordings.txt").read_text("utf-8"))
-    return [line for line in every if "--accuracy" not in line and "{recordings}" in line and "--law" not in line]
 
 
 def said_of_command(line: str) -> Said:

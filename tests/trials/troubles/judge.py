@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import tempfile
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -53,9 +51,6 @@ class Verdict:
     warnings: tuple[str, ...]  # codes of the findings that are warnings or errors
     refused: bool  # whether none of the estimates that have a truth was given
     named: bool  # whether a warning names the kind
-    cpu_s: float
-    rows: int
-    tier: str
 
     @property
     def worst(self) -> float:
@@ -75,35 +70,18 @@ class Verdict:
 def try_one(kind: Kind, seed: int, tier: str) -> Verdict:
     """Make the record of a seed, analyse it and judge."""
     record = kind.make(seed)
-    began = time.process_time()
     try:
         analysis = _analysed(record, tier)
     except AnalysisError as error:
-        spent = time.process_time() - began
         # A refusal names the trouble if it does so by a finding's code; its sentence is not searched for words.
         code = getattr(error, "code", "")
-        return Verdict(kind.name, {}, (code,) if code else (), True, code in kind.codes, spent, record.t.size, tier)
-    spent = time.process_time() - began
+        return Verdict(kind.name, {}, (code,) if code else (), True, code in kind.codes)
     warnings = tuple(dict.fromkeys(f.code for f in analysis.findings if f.severity != "info"))
     given = _held_against(analysis, record)
     sought = [name for name in record.truth if name not in COEFFICIENTS | {"offset", "noise"}]
     refused = bool(sought) and not any(name in given for name in sought)
     named = bool(kind.codes & set(warnings))
-    return Verdict(kind.name, given, warnings, refused, named, spent, record.t.size, tier)
-
-
-@cache
-def clean_seconds(rows: int, tier: str) -> float:
-    """Return the processor time that a record at 100 Hz without trouble takes at a tier, s: the least of three."""
-    t = np.arange(rows) / 100.0
-    noise = 3e-4 * np.random.default_rng(1).standard_normal(rows)
-    track = Track.from_arrays(t, 0.3 + 0.05 * np.exp(-min(0.01, 3.0 / t[-1]) * t) * np.cos(8.3 * t) + noise)
-    spent = []
-    for _ in range(3):
-        began = time.process_time()
-        analyse(track, Scene(), options_for(tier))
-        spent.append(time.process_time() - began)
-    return min(spent)
+    return Verdict(kind.name, given, warnings, refused, named)
 
 
 def _analysed(record: Record, tier: str) -> Analysis:

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tests.trials.troubles.judge import LIMIT, Verdict, clean_seconds
+from tests.trials.troubles.judge import LIMIT, Verdict
 from tests.trials.troubles.record import Kind
 
-SLOWEST = 20.0  # times what a record without trouble takes, of as many rows or of 12,000 if that is more
 CURED = 3.0  # greatest median u, over the rms error, of a kind that is to be cured
 MEASURED = 16  # records of which the rms error is known well enough to be held against that
 
@@ -59,24 +58,13 @@ class Line:
         return ", ".join(f"{code} {codes.count(code)}" for code in shares)
 
     @property
-    def slow(self) -> float:
-        """The median time of an analysis over that of a record without trouble and as many rows."""
-        return float(np.median([one.cpu_s / clean_seconds(one.rows, one.tier) for one in self.verdicts]))
-
-    @property
-    def too_slow(self) -> bool:
-        """Whether an analysis takes more than the limit of a record without trouble; short ones may take 12,000's."""
-        times = [one.cpu_s / clean_seconds(max(one.rows, 12_000), one.tier) for one in self.verdicts]
-        return float(np.median(times)) > SLOWEST
-
-    @property
     def holds(self) -> bool:
         """Whether the kind is within the limits that hold for every single kind."""
         if self.count("confident wrong") > self.n // 10:
             return False
         if self.kind.plain and any(one.warnings for one in self.verdicts):
             return False
-        return self.count("refused") <= self.n // 10 and not self.too_wide and not self.too_slow
+        return self.count("refused") <= self.n // 10 and not self.too_wide
 
     @property
     def too_wide(self) -> bool:
@@ -111,7 +99,7 @@ def beyond(lines: Sequence[Line]) -> str:
     for line in lines:
         if not line.holds:
             counts = ", ".join(f"{line.count(word)} {word}" for word in words)
-            notes = [counts, line.worst, f"u over rms error {line.wide}", f"time {line.slow:.1f}", line.warnings]
+            notes = [counts, line.worst, f"u over rms error {line.wide}", line.warnings]
             rows.append(f"{line.kind.name}: {'; '.join(filter(None, notes))}")
     return "\n".join(rows)
 
@@ -119,9 +107,8 @@ def beyond(lines: Sequence[Line]) -> str:
 def as_markdown(lines: Sequence[Line]) -> str:
     """Return the table for a page of the documentation: kinds by what stands before the colon of their names."""
     rows = [
-        "| trouble | kinds | records | right | named | refused | wrong, not named | greatest median u over rms error "
-        "| time over a clean record's |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+        "| trouble | kinds | records | right | named | refused | wrong, not named | greatest median u over rms error |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     groups: dict[str, list[Line]] = {}
     for line in lines:
@@ -129,7 +116,6 @@ def as_markdown(lines: Sequence[Line]) -> str:
     for name, group in groups.items():
         counts = [sum(line.count(w) for line in group) for w in ("right", "named", "refused", "confident wrong")]
         cured = max((line.wide[0] for line in group if line.kind.cure), default=0.0)
-        slow = max(line.slow for line in group)
         numbers = [len(group), sum(line.n for line in group), *counts]
-        rows.append(f"| {name} | {' | '.join(map(str, numbers))} | {f'{cured:.1f}' if cured else ''} | {slow:.1f} |")
+        rows.append(f"| {name} | {' | '.join(map(str, numbers))} | {f'{cured:.1f}' if cured else ''} |")
     return "\n".join(rows)

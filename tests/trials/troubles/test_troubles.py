@@ -11,7 +11,6 @@ from tests.trials.troubles.judge import try_one
 from tests.trials.troubles.kinds import PLAIN, TROUBLES
 from tests.trials.troubles.table import beyond, summed, total
 
-# Times are in the table, where a kind beyond the limit is marked; no test hangs on a machine's speed.
 # Two records of each kind by default, so that the three tiers take a few minutes; SPRINGMASS_TRIALS=20 for the whole.
 SEEDS = int(os.environ.get("SPRINGMASS_TROUBLES") or min(20, int(os.environ.get("SPRINGMASS_TRIALS", "2"))))
 WRONG, ANY_KIND, RIGHT_OR_NAMED = 0.01, 0.1, 0.95

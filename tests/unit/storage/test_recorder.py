@@ -12,7 +12,6 @@ from acquisition.events import Lost, StoredEvent
 from acquisition.live.reader import Sink
 from storage.errors import WriteFailed
 from storage.recorder import Recorder
-from storage.wire_log.appending import SECOND_COPY
 from storage.wire_log.records import LogHeader, RecordKind, SensorEntry
 from storage.wire_log.scanning import read_log
 from tests.wire import WAIT_S, Disk, json_of, parse_log
@@ -68,32 +67,6 @@ def test_a_slow_sync_holds_up_no_write() -> None:
     assert "springmass-log" not in disk.threads["sync"]
 
 
-def test_an_overflow_is_told_where_it_happened() -> None:
-    """What finds the queue full is counted, and an event in its place says of which channel and how much."""
-    disk = Disk()
-    recording = recorder(disk, queue_bytes=530)
-    disk.writes_pass.clear()
-    recording.reads([(0, 0, b"first")])
-    assert disk.held.wait(WAIT_S)
-    for number in range(100):
-        recording.reads([(number % 2, number, bytes([number]) * 10)])
-    recording.reads([(0, 100, b"")])  # would fit, but must not come before the event
-    assert (recording.status.dropped_records, recording.status.dropped_bytes) == (88, 870)
-    disk.writes_pass.set()
-    recording.drain()
-    recording.reads([(0, 101, b"after")])
-    recording.close()
-    _, _, *records = list(parse_log(bytes(disk.data)))
-    assert [record.payload for record in records[:13]] == [bytes([n]) * 10 for n in range(13)]
-    events = [(record.channel, record.mono_ns, json_of(record)) for record in records[13:15]]
-    assert events == [
-        (1, 99, {"kind": "overflow", "facts": {"records": 44, "bytes": 440, "first_ns": 13}}),
-        (0, 100, {"kind": "overflow", "facts": {"records": 44, "bytes": 430, "first_ns": 14}}),
-    ]
-    assert records[15].payload == b"after"
-    assert json_of(records[16])["dropped_records"] == 88
-
-
 def test_events_and_marks_outlast_an_overflow() -> None:
     """All of them are in the log, and the reads that were lost among them are counted."""
     disk = Disk()
@@ -128,25 +101,6 @@ def test_a_read_longer_than_a_record_is_divided() -> None:
     records = [record for record in parse_log(bytes(disk.data)) if record.kind is RecordKind.DATA]
     assert b"".join(record.payload for record in records) == long
     assert {(record.channel, record.mono_ns) for record in records} == {(1, 5)}
-
-
-def test_a_full_disk_stops_the_recording_and_counts_what_it_lost() -> None:
-    """The write that meets it begins with the second copy of the header, which nobody put."""
-    disk = Disk()
-    recording = recorder(disk)
-    disk.room = len(disk.data) + SECOND_COPY + 1000
-    disk.writes_pass.clear()
-    recording.reads([(0, 0, bytes(SECOND_COPY))])
-    assert disk.held.wait(WAIT_S)
-    for number in range(200):
-        recording.reads([(0, number, b"R%04d\r" % number)])
-    disk.writes_pass.set()
-    status = recording.drain()
-    kept = sum(record.kind is RecordKind.DATA for record in parse_log(bytes(disk.data)))
-    assert 1 < kept < 201
-    assert kept + status.dropped_records == 201
-    with pytest.raises(WriteFailed, match="No space left on device"):
-        recording.close()
 
 
 def test_what_a_full_disk_took_is_synced_at_once() -> None:

@@ -63,20 +63,6 @@ def test_header_variants(header: list[str], newline: str) -> None:
     assert FORMAT.recognises(newline.join([*header, *position_rows()]).encode())
 
 
-def test_a_single_time_that_shoots_ahead_is_the_wrong_one() -> None:
-    """One damaged digit must not condemn all that follows it."""
-    rows = position_rows()
-    rows[3] = "9.030\t20.375\t0.239"
-    flags = read(TITLE, POSITION, *rows).samples.flags
-    assert np.flatnonzero(flags & Flag.NON_MONOTONIC_TIME.value).tolist() == [3]
-
-
-def test_two_columns_that_nothing_names_are_any_table() -> None:
-    """Below the title alone they may be position or velocity, so another family asks what they are."""
-    rows = [f"{i / 100:.3f}\t{20 + i / 8:.3f}" for i in range(40)]
-    assert not FORMAT.recognises("\n".join([TITLE, *rows]).encode())
-
-
 # Velocity alone ---------------------------------------------------------------------------------------------
 
 

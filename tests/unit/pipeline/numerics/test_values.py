@@ -80,6 +80,16 @@ def test_nothing_drops_the_uncertainty_or_a_unit_that_is_defined(name: str) -> N
     assert getattr(found, "unit", None) == (None if unit is NO_UNIT else unit)
 
 
+def test_nothing_is_made_uncertain_that_is_exact() -> None:
+    """What depends on itself cancels, two alike do not, and half of an exact value is exact."""
+    twin, exact = Estimate(0.7431, 0.0002, "s"), Estimate(4.0, 0.0)
+    assert (PERIOD - PERIOD).std_dev == 0.0
+    assert (PERIOD - twin).std_dev == pytest.approx(0.0002 * math.sqrt(2.0))
+    assert (PERIOD, hash(PERIOD)) == (twin, hash(twin))
+    assert exact / 2 == 2.0
+    assert (exact / 2).u == 0.0
+
+
 def test_a_value_stays_correlated_in_another_process() -> None:
     """A pickle keeps class, text, unit and what its values share."""
     period, double, limit = pickle.loads(pickle.dumps((PERIOD, 2 * PERIOD, UpperLimit(0.01, 0.02, "m"))))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import copy
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -52,22 +50,6 @@ def test_every_way_to_hand_over_arrays_gives_the_same_numbers() -> None:
     for source in (pd.Series(y, elapsed), pd.Series(y, pd.Timestamp("2026-11-22") + elapsed)):
         found = sm.analyse(source)["period"]
         assert abs(found.value - expected["period"].value) < 1e-6 * found.value
-
-
-@dataclass
-class Measured:
-    """A dataclass of a user's own."""
-
-    period: Any
-
-
-def test_a_copied_result_keeps_unit_and_correlation() -> None:
-    """Copied by itself or within a dataclass, it is the same result."""
-    period = sm.analyse(record())["T"]
-    for copied in (copy.copy(period), copy.deepcopy(period), asdict(Measured(period))["period"]):
-        assert repr(copied) == repr(period)
-        assert copied.unit == "s"
-        assert (copied - period).u == 0.0
 
 
 def test_arrays_have_no_path() -> None:

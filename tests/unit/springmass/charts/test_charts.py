@@ -13,7 +13,7 @@ from pipeline.analyse import Analysis, Oscillation
 from pipeline.results.classic import classic
 from pipeline.several.compare import SpringRun, compare_springs
 from pipeline.track import F8
-from springmass.charts.chart import Chart, ChartNote, Panel, Series, decoded, line_of, to_json
+from springmass.charts.chart import Chart, ChartNote, Panel, Series, decoded, to_json
 from springmass.charts.draw import render
 from springmass.charts.run import charts_of
 from springmass.charts.several import CourseValue, comparison, course, drag_map, overlay
@@ -133,14 +133,6 @@ def test_motion_and_phase(charts: dict[str, Drawn], damped: Analysis) -> None:
         assert np.ptp(np.unwrap(np.arctan2(1e3 * v, omega * x))) == pytest.approx(2 * np.pi, rel=0.02)
     assert len(set(labels)) == len(labels) > 2
     assert np.max(turns[0][0]) > np.max(turns[-1][0])
-
-
-def test_a_line_of_many_periods_is_solid() -> None:
-    """A line that goes up and down all the time is marked for the browser, in which its dashes would be moiré."""
-    t = np.linspace(0.0, 20.0, 2000)
-    lines = (line_of("slow", t, np.exp(-t), "other"), line_of("quick", t, np.cos(2 * np.pi * t), "other"))
-    (panel,) = to_json(Chart("x", "X", "", (Panel("y / mm", lines),)))["panels"]
-    assert [line.get("winds", False) for line in panel["series"]] == [False, True]
 
 
 def test_several_runs(damped: Analysis) -> None:

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
+from springmass.charts.browser import script_sha256
 from springmass.page.web.security import ACT, VIEW, Access, guarded
-from springmass.report.html import script_sha256
 
 HOST = "127.0.0.1:8000"
 

@@ -62,14 +62,6 @@ def test_estimates_go_by_name_and_by_symbol(damped: sm.Run) -> None:
         damped["mu"]
 
 
-def test_estimates_calculate_with_their_correlations(damped: sm.Run) -> None:
-    """A product of estimates of one run is as certain as what they share allows."""
-    assert (damped["period"] * damped["frequency"]).std_dev < 1e-12
-    assert (damped["period"] * 2).std_dev == pytest.approx(2 * damped["period"].u)
-    assert damped["k"].nominal_value == damped["k"].value
-    assert ((2 * np.pi / damped["T"]) - damped["omega"]).std_dev < 1e-9
-
-
 def test_the_summary_fits_a_terminal(damped: sm.Run, still: sm.Run) -> None:
     """At most 15 lines of at most 79 characters, the period first, whatever the record."""
     for analysis in (damped, still):

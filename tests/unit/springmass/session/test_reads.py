@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 from collections.abc import Sequence
 from types import SimpleNamespace
@@ -65,32 +64,6 @@ def started(tee: Tee, chains: Sequence[SensorChain], since_ns: int) -> Log:
     log = Log()
     tee.start(cast(Recorder, log), chains, since_ns)
     return log
-
-
-def test_what_is_recorded_decodes_to_what_was_shown() -> None:
-    """Cut anywhere, with a break in between, the chain fed one read at a time gives the same bits as the tee."""
-    data = b"".join(map(frame, range(40)))
-    cuts = [0, *np.sort(np.random.default_rng(2).integers(1, len(data), 25)).tolist(), len(data)]
-    tee = Tee([chain()])
-    log = started(tee, [chain()], 0)
-    other = chain()
-    expected = []
-    for n, (a, b) in enumerate(itertools.pairwise(cuts)):
-        if n == 12:
-            tee.event(0, n * STEP_NS, Lost(why="cable"))
-            other.lost()
-        tee.reads([(0, n * STEP_NS, data[a:b])])
-        expected.append(other.feed(n * STEP_NS, data[a:b]))
-    ((channel, block),) = tee.blocks()
-    whole = concatenate(expected)
-    assert channel == 0
-    assert block.host_ns is not None
-    assert whole.host_ns is not None
-    for name in ("t", "distance", "flags", "host_ns"):
-        assert getattr(block, name).tobytes() == getattr(whole, name).tobytes()
-    assert b"".join(data for _, _, data in log.taken) == data
-    assert log.events == [f'0 {12 * STEP_NS} lost {{"why": "cable"}}']
-    assert tee.gone == {0: "cable"}
 
 
 def test_samples_that_nobody_asks_for_do_not_fill_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:

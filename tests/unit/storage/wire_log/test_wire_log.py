@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import errno
 import struct
 import zlib
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from acquisition.events import Reopened, StoredEvent
+from acquisition.events import StoredEvent
 from storage.errors import WriteFailed
 from storage.schema import ValueRefused
 from storage.wire_log.appending import WireLogWriter
@@ -27,7 +25,7 @@ from storage.wire_log.records import (
 )
 from storage.wire_log.scanning import Scan, read_log
 from tests.sampling import sampled
-from tests.wire import Disk, append, json_of, parse_log
+from tests.wire import Disk, append, parse_log
 
 HEADER = LogHeader(
     sensors=(
@@ -41,35 +39,6 @@ HEADER = LogHeader(
     title="Träger",
     version="0.1.0",
 )
-
-
-def content(record: Record) -> tuple[Any, ...]:
-    """Return what was appended."""
-    return record.kind, record.channel, record.mono_ns, record.payload
-
-
-def test_what_is_appended_comes_back(tmp_path: Path) -> None:
-    """Every kind of record returns with its time, channel and bytes, and an intact log says so."""
-    path = tmp_path / "run.wire"
-    log = WireLogWriter(path, HEADER)
-    reported = [
-        (RecordKind.DATA, 7, 1, bytes(range(256))),
-        (RecordKind.DATA, 0, 2, b""),
-        (RecordKind.MARK, 0, 3, "Stoß ∂".encode()),
-        (RecordKind.EVENT, 7, 4, event_payload(Reopened(gap_s=0.25))),
-        (RecordKind.END, 0, 5, b"{}"),
-    ]
-    for number, (kind, channel, mono_ns, payload) in enumerate(reported, 1):
-        append(log, kind, payload, mono_ns=mono_ns, channel=channel)
-        assert log.written.records == number + 1
-    log.close()
-    contents = read_log(path)
-    header, *records = contents
-    assert [content(record) for record in records] == reported
-    assert (header.kind, header.offset, contents.header) == (RecordKind.HEADER, 0, HEADER)
-    assert (records[2].text(), json_of(records[3])) == ("Stoß ∂", {"kind": "reopened", "facts": {"gap_s": 0.25}})
-    assert contents.damage.intact
-    assert contents.damage.ended
 
 
 def test_a_record_lies_in_the_file_as_documented() -> None:
@@ -88,22 +57,6 @@ def test_a_log_that_cannot_be_made_says_why(tmp_path: Path) -> None:
     with pytest.raises(WriteFailed, match="header cannot be written"):
         WireLogWriter(tmp_path / "run.wire", odd)
     assert not list(tmp_path.iterdir())
-
-
-def test_a_failed_sync_is_never_taken_back() -> None:
-    """After one failed sync nothing more counts as safe: the kernel forgets which pages it could not write."""
-    disk = Disk()
-    log = WireLogWriter("run.wire", HEADER, open_file=disk)
-    append(log, RecordKind.DATA, b"R0500\r", mono_ns=0)
-    disk.sync_trouble = OSError(errno.EIO, "Input/output error")
-    with pytest.raises(WriteFailed, match="could not be synced"):
-        log.sync()
-    disk.sync_trouble = None
-    with pytest.raises(WriteFailed, match="could not be synced"):
-        log.sync()
-    with pytest.raises(WriteFailed, match="could not be synced"):
-        append(log, RecordKind.DATA, b"R0500\r", mono_ns=0)
-    assert (log.synced.records, log.written.records) == (1, 2)
 
 
 def test_the_header_survives_its_first_page() -> None:
@@ -200,18 +153,3 @@ def test_a_log_that_grows_gives_what_a_reader_finds_at_its_end(tmp_path: Path, s
     whole = read_log(path)
     assert came == list(whole)
     assert follower.scan.damage == whole.damage
-
-
-def test_half_a_record_waits_and_damage_is_passed_over(tmp_path: Path) -> None:
-    """A torn end may still be written; behind bytes that are no record the next one comes, as by any reader."""
-    path = tmp_path / "run.wire"
-    whole = written(tmp_path)
-    path.write_bytes(whole[:-3])
-    follower = Follower(path)
-    assert len(follower.records()) == 301
-    path.write_bytes(whole)
-    assert [record.kind for record in follower.records()] == [RecordKind.END]
-    count = read_log(path).damage.records
-    path.write_bytes(whole + b"damaged" + frame(RecordKind.DATA, b"late", sequence=count + 2, mono_ns=500, log=7))
-    (late,) = follower.records()
-    assert (late.payload, late.lost_before) == (b"late", 2)
