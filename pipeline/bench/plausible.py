@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from pipeline.bench.scene import BENCH_KEYS, PLACES, Scene
 from pipeline.bench.spring import GRAVITY_M_PER_S2
-from pipeline.bench.typed import readings
+from pipeline.bench.typed import other_reading
 from pipeline.numerics.estimate import Estimate
 
 USUAL: dict[str, tuple[float, float]] = {
@@ -58,9 +58,9 @@ def slips(scene: Scene) -> tuple[Slip, ...]:
         value = estimate.value
         usual, effect = _usual(scene, quantity.attribute)
         if not usual[0] <= value <= usual[1]:
-            others = [each for each in readings(value, quantity.unit, usual) if each.unit != quantity.unit]
-            asked = f": {value:g} {quantity.unit} or {value:g} {others[0].unit}?" if others else ""
-            decides = not others or not 1.0 / DECIDING < others[0].ratio < DECIDING
+            other = other_reading(value, quantity.unit, usual)
+            asked = "" if other is None else f": {value:g} {quantity.unit} or {value:g} {other.unit}?"
+            decides = other is None or not 1.0 / DECIDING < other.ratio < DECIDING
             beyond = f"is beyond {usual[0]:g} to {usual[1]:g} {quantity.unit}"
             words = f"{value:g} {effect or beyond}{asked}"
             found.append(Slip(quantity.attribute, words, bool(asked), decides))

@@ -87,17 +87,17 @@ class UnitReading(NamedTuple):
     ratio: float
 
 
-def readings(value: float, unit: str, usual: tuple[float, float]) -> list[UnitReading]:
-    """Return the units in which the bare number would be a usual value, those of a bench first.
+def other_reading(value: float, unit: str, usual: tuple[float, float]) -> UnitReading | None:
+    """Return the other unit in which the bare number would be a usual value, that of a bench first; None without any.
 
-    >>> readings(10.2, "m", (0.0, 1.0))[0].unit, readings(1005.0, "Pa", (5e4, 1.1e5))[0].unit
+    >>> other_reading(10.2, "m", (0.0, 1.0)).unit, other_reading(1005.0, "Pa", (5e4, 1.1e5)).unit
     ('cm', 'hPa')
-    >>> readings(294.15, "degC", (-30.0, 50.0))[0].unit
+    >>> other_reading(294.15, "degC", (-30.0, 50.0)).unit
     'K'
     """
     within = [
         UnitReading(name, (scale.factor * value + scale.zero) / value)
         for name, scale in scales_of(unit).items()
-        if value and usual[0] <= scale.factor * value + scale.zero <= usual[1]
+        if value and name != unit and usual[0] <= scale.factor * value + scale.zero <= usual[1]
     ]
-    return sorted(within, key=lambda each: each.unit not in ("g", "cm", "hPa", "K"))
+    return min(within, key=lambda each: each.unit not in ("g", "cm", "hPa", "K"), default=None)

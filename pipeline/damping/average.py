@@ -32,7 +32,7 @@ class Weighted:
 def average_over_laws(damping: Damping, amplitude: float) -> tuple[Weighted, ...]:
     """Return the laws over which quantities are averaged, first the law whose coefficients are stated.
 
-    A stated law that is selected is the only one. ``amplitude_m`` is the mean amplitude of the record.
+    A stated law that is selected is the only one. ``amplitude`` is the mean one of the record.
 
     The law of linear and quadratic drag together contains "none", "linear" and "quadratic" as special cases. If one of
     these is selected, a term was not detected, but it need not be zero. So unless the recording contradicts it, this
