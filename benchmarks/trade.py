@@ -20,7 +20,7 @@ from pipeline.errors import AnalysisError
 from pipeline.options import TIERS, options_for
 from pipeline.results.classic import classic
 from pipeline.track import F8, Track
-from springmass.trade import SCORED_QUANTITIES, RecordDefect, TrueMotion, bounds, record
+from springmass.trade import SCORED_QUANTITIES, RecordDefect, TrueMotion, bounds, distances_of
 
 FIGURE = Path(__file__).resolve().parents[1] / "docs" / "figures" / "trade.svg"
 MOTION = TrueMotion(seconds=120.0)
@@ -119,7 +119,7 @@ def measure(motion: TrueMotion, kind: RecordDefect, seeds: int) -> dict[str, Row
     errors: dict[str, dict[str, list[float]]] = {name: {} for name in METHODS}
     times = dict.fromkeys(METHODS, math.inf)
     for seed in range(seeds):
-        track = Track.from_arrays(motion.t, record(motion, kind, np.random.default_rng(seed)), kind="simulated")
+        track = Track.from_arrays(motion.t, distances_of(motion, kind, np.random.default_rng(seed)), kind="simulated")
         for name, method in METHODS.items():
             start = time.perf_counter()
             try:

@@ -123,7 +123,7 @@ def spoilt(motion: TrueMotion, kind: RecordDefect) -> TrueMotion:
     return motion
 
 
-def record(motion: TrueMotion, kind: RecordDefect, rng: np.random.Generator) -> F8:
+def distances_of(motion: TrueMotion, kind: RecordDefect, rng: np.random.Generator) -> F8:
     """Return the distances of one record in m, with a random phase."""
     t, size = motion.t, float(motion.theta[0])
     angle, rest = 2.0 * math.pi * motion.frequency_hz * t, 4.0 * size
@@ -175,7 +175,7 @@ def measure_tiers(motion: TrueMotion, seeds: int) -> Iterator[list[dict[str, Any
         times = dict.fromkeys(TIERS, math.inf)
         for seed in range(seeds):
             track = Track.from_arrays(
-                spoilt_motion.t, record(spoilt_motion, kind, np.random.default_rng(seed)), kind="simulated"
+                spoilt_motion.t, distances_of(spoilt_motion, kind, np.random.default_rng(seed)), kind="simulated"
             )
             for tier in TIERS:
                 start = time.perf_counter()

@@ -29,7 +29,7 @@ def half_frequency(residual: Residual) -> Outcome | None:
     passes a sensor twice. A sideways swing at half of the frequency does neither. The magnitude of a sine has no such
     line, but cusps.
     """
-    if not residual.enough:
+    if not residual.enough or residual.turn > math.pi:  # so few samples show no harmonics
         return None
     level, moves, u_moves = _mean_by_amplitude(residual)
     values = residual.values + residual.fitted.modes.independent(residual.samples.track.t[residual.rows])

@@ -29,8 +29,8 @@ class SpringRun:
     """The result of one run for its spring."""
 
     name: str
-    # Angular frequency of the undamped motion, rad/s. Its uncertainty is only that from scatter of the record; that of
-    # the clock may be common to several runs and is separate.
+    # Angular frequency of the undamped motion, rad/s. Its uncertainty is that from scatter of the record and from a
+    # frequency that changes during it; that of the clock may be common to several runs and is separate.
     angular_frequency: Estimate
     mass_kg: Estimate  # oscillating mass without the spring: bob, disc and air carried along
     u_clock: float = 0.0  # relative standard uncertainty of the clock's rate
@@ -49,7 +49,10 @@ class SpringRun:
         # The frequency without damping, from the run's own spring constant.
         k = derived.estimates["spring_constant"].value
         natural = math.sqrt(k / derived.effective_mass_kg.value)
-        return cls(name, Estimate(natural, omega.u, "rad/s"), derived.own_mass_kg, u_clock, clock)
+        # A frequency that changes during the run makes k uncertain too, by its difference to the mean.
+        changing = [c.u for c in derived.budgets["spring_constant"].contributions if c.name == "mean_frequency"]
+        u = math.hypot(omega.u, *(0.5 * natural * each / k for each in changing))
+        return cls(name, Estimate(natural, u, "rad/s"), derived.own_mass_kg, u_clock, clock)
 
 
 @dataclass(frozen=True, slots=True)

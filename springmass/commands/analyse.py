@@ -21,14 +21,16 @@ from springmass.commands.options import (
     FURTHER_OPTIONS,
     AnalysisArguments,
     BenchOptions,
+    ClockPpm,
     FiguresOption,
     FileArgument,
     Json,
     ReadArguments,
     Scenes,
     Strict,
+    Template,
 )
-from springmass.commands.parameters import Finite, PartsPerMillion, argument, flag, option, output
+from springmass.commands.parameters import Finite, argument, flag, option, output
 from springmass.commands.questions import for_one
 from springmass.errors import HINT, LOG, OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, of_several
 from springmass.layout import STDIN
@@ -55,9 +57,7 @@ class AnalyseOptions:
     scene: Scenes = ()
     from_s: Annotated[Finite | None, option("S", "use samples from this time on, s", "--from")] = None
     to_s: Annotated[Finite | None, option("S", "use samples up to this time, s", "--to")] = None
-    clock_ppm: Annotated[
-        PartsPerMillion | None, option("PPM", "largest rate error of the sensor's clock (default: that of its family)")
-    ] = None
+    clock_ppm: ClockPpm = None
     method: Annotated[
         Literal["classic"] | None,
         option("NAME", "also apply the lab report's classic method, for comparison"),
@@ -67,9 +67,7 @@ class AnalyseOptions:
     keep: Annotated[bool, flag("keep the options of reading in the notes next to the file")] = False
     no_report: Annotated[bool, flag("print the results, but write no files")] = False
     full: Annotated[bool, flag("print all warnings and notes, and the sources of uncertainty")] = False
-    template: Annotated[
-        Literal["latex"] | None, option("KIND", "also write a lab report template: latex"), FURTHER_OPTIONS
-    ] = None
+    template: Annotated[Template, FURTHER_OPTIONS] = None
     figures: Annotated[FiguresOption, FURTHER_OPTIONS] = ()
     si: Annotated[bool, flag("print SI units without prefixes"), FURTHER_OPTIONS] = False
     json: Json = False

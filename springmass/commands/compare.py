@@ -7,7 +7,7 @@ import math
 import shlex
 import sys
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 from acquisition.errors import visible
 from pipeline.findings.finding import kinds
@@ -20,6 +20,7 @@ from springmass.commands.options import (
     ReadPairs,
     Scenes,
     Strict,
+    Template,
 )
 from springmass.commands.parameters import Share, argument, option, output
 from springmass.comparing.comparison import SpringComparison, compare_runs, comparison_json, comparison_words
@@ -54,7 +55,7 @@ def compare(
     ] = None,
     output: Annotated[FileArgument | None, output("DIR", "folder for a report (default: write no report)")] = None,
     figures: FiguresOption = (),
-    template: Annotated[Literal["latex"] | None, option("KIND", "also write a lab report template: latex")] = None,
+    template: Template = None,
     as_json: Json = False,
     strict: Strict = False,
     reading: ReadPairs = ReadPairs(),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Group, Parameter, Token
 
 from acquisition.recordings.reading import ReadOptions, ValueKind, value_of
-from springmass.commands.parameters import LawName, Positive, TcpPort, argument, flag, option
+from springmass.commands.parameters import LawName, PartsPerMillion, Positive, TcpPort, argument, flag, option
 from springmass.errors import ProgramError
 from springmass.loading.options import LOAD_FIELDS, Accuracy, AnalysisOptions, LoadOptions
 
@@ -68,6 +68,10 @@ Json = Annotated[bool, Parameter(name="--json", help="print JSON on standard out
 DecoderOptions = Annotated[
     tuple[tuple[str, Any], ...], converted("NAME=VALUE", "option of the decoder; may be repeated", _decoder_option)
 ]
+ClockPpm = Annotated[
+    PartsPerMillion | None, option("PPM", "largest rate error of the sensor's clock (default: that of its family)")
+]
+Template = Annotated[Literal["latex"] | None, option("KIND", "also write a lab report template: latex")]
 Overwrite = Annotated[bool, flag("replace an existing output")]
 Strict = Annotated[bool, flag("exit with code 5 if a finding is an error")]
 

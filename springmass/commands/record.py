@@ -26,9 +26,8 @@ from pipeline.bench.disc import scene_air
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
 from springmass.commands.given import GivenOptions
-from springmass.commands.options import DecoderOptions, FileArgument, PageOptions
+from springmass.commands.options import ClockPpm, DecoderOptions, FileArgument, PageOptions
 from springmass.commands.parameters import (
-    PartsPerMillion,
     Positive,
     ReadingsPerSecond,
     SpeedOfSound,
@@ -100,9 +99,7 @@ class RecordOptions:
         tuple[Positive, ...], option("M", "ruler distance of the bob at rest, m; may be repeated; needs --still")
     ] = ()
     speed_of_sound: Annotated[SpeedOfSound | None, option("C", "speed of sound for echo times, m/s")] = None
-    clock_ppm: Annotated[
-        PartsPerMillion | None, option("PPM", "largest rate error of the sensor's clock (default: that of its family)")
-    ] = None
+    clock_ppm: ClockPpm = None
     trigger: Annotated[Positive | None, option("M", "start when the bob is M metres from its rest position")] = None
     pre: Annotated[Positive | None, option("S", "seconds to keep before the trigger (default: 2)")] = None
     seed: Annotated[Whole, option("N", "with --simulate: seed of the noise (default: 0)")] = 0

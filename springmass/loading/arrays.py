@@ -4,7 +4,7 @@ import json
 from collections.abc import Collection, Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -30,12 +30,12 @@ def loaded_of(source: Any, options: AnalysisOptions) -> Loaded:
     A dataset of springmass, or one that xarray read from a run file, comes with all that the file states.
     """
     refuse_reading(options, type(source).__name__, ("unit", "time_unit"))
-    t, y, flags = _columns(source)
+    (t, t_unit), (y, y_unit), flags = _columns(source)
     about: Mapping[str, Any] = getattr(source, "attrs", {})
-    measure = _measure(options.unit or y.unit or _unit_of(y.values) or "m")
+    measure = _measure(options.unit or y_unit or _unit_of(y) or "m")
     track = Track.from_arrays(
-        _seconds(t.values, options.time_unit or t.unit or _unit_of(t.values)),
-        _numbers(y.values, "values") * 10.0**measure.power * measure.factor,
+        _seconds(t, options.time_unit or t_unit or _unit_of(t)),
+        _numbers(y, "values") * 10.0**measure.power * measure.factor,
         flags=flags,
         **{name: about[name] for name in ("rate_hz", "sigma_m", "quantum_m", "kind") if name in about},
         unit=measure.si,
@@ -44,7 +44,7 @@ def loaded_of(source: Any, options: AnalysisOptions) -> Loaded:
     samples = Block(0, track.t, track.y, track.flags, None, velocity, measure.quantity, track.unit)
     if (recorded := _stated(source, about, samples)) is not None:
         return recorded
-    clock = getattr(t.values, "attrs", {}).get("clock", track.clock)
+    clock = getattr(t, "attrs", {}).get("clock", track.clock)
     info: Any = (track.kind, "", track.rate_hz, track.sigma_m, track.quantum_m, clock)
     return Loaded(Recording("", "", SourceInfo(*info), "", samples), "memory")
 
@@ -99,29 +99,22 @@ def about_json(loaded: Loaded, scene: Mapping[str, Any]) -> str:
     return json.dumps(about)
 
 
-class _ArrayColumn(NamedTuple):
-    """Values, and the unit that their heading states."""
-
-    values: Any
-    unit: str = ""
-
-
-def _columns(source: Any) -> tuple[_ArrayColumn, _ArrayColumn, Any]:
-    """Return the times, the values and the flags of a container."""
+def _columns(source: Any) -> tuple[tuple[Any, str], tuple[Any, str], Any]:
+    """Return the times and the values of a container, each with the unit that its heading states, and the flags."""
     if hasattr(source, "keys") and "distance" in source:
         t = source["time"] if "time" in source else _index_of(source)
         # The "in" of a frame and of a dataset is that of their columns.
         flags = source["quality"] if "quality" in source else None  # noqa: SIM401
         if t is not None:
-            return _ArrayColumn(t), _ArrayColumn(source["distance"]), flags
+            return (t, ""), (source["distance"], ""), flags
     elif hasattr(source, "columns"):
         return *_by_headings(source), None
     elif getattr(source, "ndim", None) == 1 and (along := _along(source)) is not None:
-        return _ArrayColumn(along), _ArrayColumn(source), None
+        return (along, ""), (source, ""), None
     elif getattr(source, "ndim", None) == 1 and hasattr(source, "index"):
-        return _ArrayColumn(_index_of(source)), _ArrayColumn(source), None
+        return (_index_of(source), ""), (source, ""), None
     elif isinstance(source, list | tuple) and len(source) == 2:
-        return _ArrayColumn(source[0]), _ArrayColumn(source[1]), None
+        return (source[0], ""), (source[1], ""), None
     if coords := ", ".join(map(str, getattr(source, "coords", ()))):
         raise TrackError(
             f"its times were expected as a coordinate named time, got {coords}", "rename the one with times"
@@ -135,7 +128,7 @@ def _along(source: Any) -> Any:
     return along.get("time", next(iter(along.values())) if len(along) == 1 else None)
 
 
-def _by_headings(frame: Any) -> tuple[_ArrayColumn, _ArrayColumn]:
+def _by_headings(frame: Any) -> tuple[tuple[Any, str], tuple[Any, str]]:
     """Return the time and the only other column of a frame, whose headings are as in a CSV file."""
     headings = [(name, *heading_of(str(name))) for name in frame.columns]
     times = [(name, unit) for name, words, unit in headings if is_time(words)]
@@ -143,7 +136,7 @@ def _by_headings(frame: Any) -> tuple[_ArrayColumn, _ArrayColumn]:
     if len(times) != 1 or len(others) != 1:
         named = ", ".join(repr(name) for name, *_ in headings)
         raise TrackError(f"one column of times and one of values were expected, got {named}", "choose two of them")
-    return _ArrayColumn(frame[times[0][0]], times[0][1]), _ArrayColumn(frame[others[0][0]], others[0][1])
+    return (frame[times[0][0]], times[0][1]), (frame[others[0][0]], others[0][1])
 
 
 def _index_of(source: Any) -> Any:

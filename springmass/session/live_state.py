@@ -56,9 +56,8 @@ class Progress:
     gaps: int
     rate_hz: float  # samples from the first sensor in the last second
     motion: Callable[[], Run | NotYet]  # of the first sensor's last seconds; it takes milliseconds
-    status: RecorderStatus | None
+    status: RecorderStatus | None  # None: it waits for its trigger
     disk_free_bytes: int | None
-    waiting: bool  # for its trigger
     unshown: int  # samples that arrived too fast to be shown; they are in the run file
     gone: Sequence[str]  # why ports were lost that have not come back
     silent_s: float  # since the first sensor's last reading

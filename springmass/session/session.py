@@ -404,7 +404,7 @@ class Session:
                 self.failures.note("analysis", error)
                 return NotYet(f"no motion shown ({type(error).__name__})")
 
-        tee, chains, waiting = self._tee, self._chains, recorder is None
+        tee, chains = self._tee, self._chains
         shown.follow(tee.first)
         zero_ns = start_ns if shown.origin.ns is None else shown.origin.ns
         return Progress(
@@ -415,11 +415,10 @@ class Session:
             motion=motion,
             status=None if recorder is None else recorder.status,
             disk_free_bytes=None if recorder is None else free_bytes(recorder.path.parent),
-            waiting=waiting,
             unshown=tee.unshown,
             gone=tuple(tee.gone.values()),
             silent_s=shown.silent_s(now_ns),
-            trouble=trouble_of(shown, chains, waiting=waiting),
+            trouble=trouble_of(shown, chains, waiting=recorder is None),
             marks=[((host_ns - zero_ns) * 1e-9, text) for host_ns, text in self._marks],
             tick=tick,
         )

@@ -55,7 +55,7 @@ class ProgressLine:
 
 def _parts(progress: Progress, style: TerminalStyle) -> list[str]:
     """Return time, motion, rate, missing values, gaps, and bytes safe on disk."""
-    parts = ["waiting for the bob" if progress.waiting else f"{progress.seconds:.0f} s"]
+    parts = ["waiting for the bob" if progress.status is None else f"{progress.seconds:.0f} s"]
     # On a terminal the first analysis, which loads its libraries, must not delay troubles and keys.
     listening = style.terminal and progress.seconds < FIRST_MOTION_S
     motion = NotYet("listening") if listening else progress.motion()

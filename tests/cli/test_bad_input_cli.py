@@ -1,4 +1,4 @@
-"""Bad input: one line that names the file and what to do, or a sample flagged and counted; never a wrong number."""
+"""Bad input: one line that names the file and what to do; never a wrong number."""
 
 from __future__ import annotations
 

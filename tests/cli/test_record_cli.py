@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import os
-import pty
 import re
 import subprocess
 import sys
-import tty
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -24,6 +21,7 @@ from springmass.cli import main
 from storage.run_file.reading import open_run
 from tests.cli.conftest import Cli
 from tests.encoders import ENCODERS
+from tests.faults.conftest import on_a_terminal
 from tests.sampling import sampled
 
 SCENE = """
@@ -50,11 +48,8 @@ def scene(tmp_path: Path) -> Path:
 @pytest.fixture
 def silent_port() -> Iterator[str]:
     """Return a port on which nobody speaks."""
-    master, slave = pty.openpty()
-    tty.setraw(slave)
-    yield os.ttyname(slave)
-    os.close(slave)
-    os.close(master)
+    with on_a_terminal(lambda _: b"") as port:
+        yield port
 
 
 def speaking(family: str, seconds: float = 30.0, rate_hz: float = 100.0) -> VirtualPort:

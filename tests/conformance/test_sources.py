@@ -1,9 +1,8 @@
-"""The rules that every source keeps; a new one joins by adding a maker to ``SOURCES``."""
+"""The rules that a replay keeps at every speed."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ import pytest
 from acquisition.block import Block, Flag, SourceInfo, concatenate
 from acquisition.clock import Clock, VirtualClock
 from acquisition.replay import Replay
-from acquisition.simulated import VirtualRangefinder, VirtualSensor
 
 SECONDS = 120
 RATE_HZ = 100.0
@@ -27,67 +25,39 @@ def run() -> Block:
     return Block(0, t, distance, flags, None, np.gradient(distance, t))
 
 
-def replay(speed: float | None) -> Callable[[Clock], Replay]:
-    """Return a maker of replays at a speed."""
-    info = SourceInfo("replay", "run", RATE_HZ, quantum_m=1e-5)
-    return lambda clock: Replay(run(), clock, info=info, speed=speed)
+def replay(clock: Clock, speed: float | None) -> Replay:
+    """Return a replay of it at a speed."""
+    return Replay(run(), clock, info=SourceInfo("replay", "run", RATE_HZ, quantum_m=1e-5), speed=speed)
 
 
-def simulated(clock: Clock) -> Replay:
-    """Return a simulated source with noise, false echoes and readings without a target."""
-    sensor = VirtualSensor(rate_hz=RATE_HZ, false_echo_rate_hz=0.5, dead_time_s=1.17e-3)
-    bob = VirtualRangefinder(lambda t: 0.25 + 0.05 * math.sin(7.9 * t), sensor, np.random.default_rng(1))
-    return Replay(bob.block(SECONDS), clock, info=bob.info("run"))
+every_speed = pytest.mark.parametrize("speed", [1.0, 10.0, None])
 
 
-REPLAYS = {"replay-1x": replay(1.0), "replay-10x": replay(10.0), "replay-max": replay(None)}
-"""Makers of sources that deliver :func:`run`."""
-SOURCES = {**REPLAYS, "simulated": simulated}
-"""Makers of sources that deliver two minutes at 100 Hz."""
-PACE = {"replay-10x": 10.0, "replay-max": math.inf}
-"""Of the others it is that of the run."""
-
-every_source = pytest.mark.parametrize("name", SOURCES)
-every_replay = pytest.mark.parametrize("name", REPLAYS)
-
-
-@every_replay
-def test_samples_are_those_of_the_run_bit_for_bit(name: str) -> None:
-    """Whatever the pace, the samples are the same."""
-    with SOURCES[name](VirtualClock()) as source:
-        joined = concatenate(source)
+@every_speed
+def test_samples_are_those_of_the_run_bit_for_bit(speed: float | None) -> None:
+    """Whatever the pace, the samples are the same, and each block begins where the one before ended."""
+    with replay(VirtualClock(), speed) as source:
+        blocks = list(source)
+    assert [block.first for block in blocks] == [0, *np.cumsum([len(block) for block in blocks])[:-1].tolist()]
+    joined = concatenate(blocks)
     for column in ("t", "distance", "flags", "velocity"):
         assert getattr(joined, column).tobytes() == getattr(run(), column).tobytes()
     assert joined.host_ns is None
 
 
-@every_source
-def test_blocks_follow_each_other_without_a_hole(name: str) -> None:
-    """Each block begins where the one before ended, and none is empty."""
-    with SOURCES[name](VirtualClock()) as source:
-        expected = 0
-        for block in source:
-            assert isinstance(block, Block)
-            assert block.first == expected
-            assert len(block) > 0
-            expected += len(block)
-    assert expected == len(run())
-
-
-@every_source
-def test_it_takes_the_clock_time_of_its_pace_and_no_real_time(name: str) -> None:
-    """A virtual clock ends at the record's length over the speed, to the sound's way to the bob."""
+@every_speed
+def test_it_takes_the_clock_time_of_its_pace_and_no_real_time(speed: float | None) -> None:
+    """A virtual clock ends at the record's length over the speed."""
     clock = VirtualClock()
-    with SOURCES[name](clock) as source:
-        for _ in source:
-            pass
-    assert clock.now_ns() == pytest.approx((SECONDS - 1 / RATE_HZ) / PACE.get(name, 1.0) * 1e9, abs=2e5)
+    with replay(clock, speed) as source:
+        assert sum(map(len, source)) == len(run())
+    assert clock.now_ns() == pytest.approx((SECONDS - 1 / RATE_HZ) / (speed or math.inf) * 1e9, abs=2e5)
 
 
-@every_source
-def test_leaving_ends_the_iteration(name: str) -> None:
+@every_speed
+def test_leaving_ends_the_iteration(speed: float | None) -> None:
     """After the ``with``, nothing is delivered any more; leaving twice does no harm."""
-    source = SOURCES[name](VirtualClock())
+    source = replay(VirtualClock(), speed)
     with source:
         blocks = iter(source)
         next(blocks)

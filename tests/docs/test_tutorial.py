@@ -29,10 +29,11 @@ LONG = (
     "docs/how-to/record-at-the-bench.md",
     "docs/how-to/simulate-a-bench.md",
     "docs/reference/command-line.md",
+    "docs/decisions/0004-demodulation-first.md",
     "docs/explanation/euler.md",
     "docs/explanation/method.md",
 )
-"""Pages with many commands: they run with the trials."""
+"""Pages with many commands or long fits: they run with the trials."""
 ELSEWHERE = (
     "docs/how-to/analyse-a-course.md",  # tests/cli/test_batch_cli.py, with folders of recordings
     "docs/how-to/many-machines.md",  # tests/docs/test_many_machines.py, with a cluster on this machine

@@ -88,17 +88,6 @@ def test_unsorted_times_are_refused(tier: str) -> None:
         assert isinstance(found, str), found.estimates
 
 
-@pytest.mark.parametrize("tier", TIERS)
-def test_times_that_run_back_are_told(tier: str) -> None:
-    """One time thirty years ahead, or the second half first: that is said, and no period is given that is wrong."""
-    for t in (np.where(np.arange(T.size) == 500, 1e9, T), np.roll(T, T.size // 2)):
-        found = outcome(t, swing() if t[0] == 0.0 else np.roll(swing(), T.size // 2), tier)
-        if isinstance(found, Analysis):
-            assert "non_monotonic_time" in {finding.code for finding in found.findings}
-            period = found.estimates.get("period")
-            assert period is None or abs(period.value - PERIOD) <= 5 * period.u
-
-
 @pytest.mark.parametrize("tier", sampled(sorted(TIERS, reverse=True), 1))
 @pytest.mark.parametrize(
     "y",

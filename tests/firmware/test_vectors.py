@@ -21,29 +21,17 @@ SCRIPT = (
     (6.0, "J500"),
     (6.2, "R125"),
 )
-"""Commands that bring out every line that the firmware knows, with the troubles of :func:`sent_lines`."""
+"""Commands that bring out every line that the firmware knows, with the troubles of the bench."""
 
 
-@pytest.fixture
-def sent_lines(emulate: Emulate) -> list[str]:
-    """Return what the firmware says at a bench where a bob of 0.4 m hangs still, and much goes wrong."""
-    run = emulate(
-        7.0,
-        say=SCRIPT,
-        noise=0,
-        amplitude=0,
-        damping=0,
-        rest=0.4,
-        temperature=21.3,
-        absent="2,2.2",
-        gone="2.5,2.6",
-        stuck="3,3.5",
-    )
-    return [line.decode("ascii") for _, line in run.lines]
+def test_the_firmware_sends_the_vectors_of_the_page(emulate: Emulate) -> None:
+    """Each of them, of a bob of 0.4 m that hangs still while much goes wrong.
 
-
-def test_the_firmware_sends_the_vectors_of_the_page(sent_lines: list[str]) -> None:
-    """Each of them, and among them every status, a temperature, both identifications and the refusal."""
+    Among them are every status, a temperature, both identifications and the refusal.
+    """
+    still = {"noise": 0, "amplitude": 0, "damping": 0, "rest": 0.4, "temperature": 21.3}
+    run = emulate(7.0, say=SCRIPT, **still, absent="2,2.2", gone="2.5,2.6", stuck="3,3.5")
+    sent_lines = [line.decode("ascii") for _, line in run.lines]
     page = (ROOT / "docs" / "reference" / "line-protocol.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| `(\$.*?)` \|", page.partition("\n## Vectors\n")[2], re.MULTILINE)
     # Those that the firmware sends: with leading zeros, a refusal, and identifications.

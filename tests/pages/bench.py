@@ -101,15 +101,16 @@ class Client:
         connection.close()
         return answered
 
-    def socket(self) -> ClientConnection:
-        """Open the page's socket."""
+    def socket(self, path: str = "/v2/run") -> ClientConnection:
+        """Open a socket of the page."""
         origin: Any = f"http://{self.netloc}"
         return connect(
-            f"ws://{self.netloc}/v2/run",
+            f"ws://{self.netloc}{path}",
             origin=origin,
             additional_headers={"Cookie": self.cookie},
             ping_interval=None,
             max_queue=None,
+            max_size=None,
         )
 
     def code_after(self, message: str | bytes) -> int | None:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import http.client
-import io
 import json
 import os
 import time
-import zipfile
 from collections.abc import Iterator, Mapping
 from typing import Any
 from urllib.parse import urlencode
@@ -15,38 +13,13 @@ from urllib.parse import urlencode
 import numpy as np
 
 import springmass
+from tests.conformance.test_formats import packed, workbook
 from tests.pages.bench import LIMIT_S, Client
 
 T = np.arange(900) / 30.0
 X_M = 0.02 + 0.05 * np.exp(-0.01 * T) * np.cos(8.0 * T) + np.random.default_rng(3).normal(0.0, 2e-4, T.size)
 MASS_G = 217.6
 SETTLED_S = 600.0 if os.environ.get("SPRINGMASS_EXAMPLES") == "nightly" else 60.0
-WORKBOOK = {
-    "[Content_Types].xml": '<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">'
-    '<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
-    '<Default Extension="xml" '
-    'ContentType="application/vnd.openxmlformats-officedocument.spreadsheetml.sheet.main+xml"/>'
-    '<Override PartName="/xl/worksheets/sheet1.xml" '
-    'ContentType="application/vnd.openxmlformats-officedocument.spreadsheetml.worksheet+xml"/></Types>',
-    "_rels/.rels": '<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">'
-    '<Relationship Id="r1" Type="http://schemas.openxmlformats.org/officeDocument/2006/relationships/officeDocument" '
-    'Target="xl/workbook.xml"/></Relationships>',
-    "xl/workbook.xml": '<workbook xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main" '
-    'xmlns:r="http://schemas.openxmlformats.org/officeDocument/2006/relationships">'
-    '<sheets><sheet name="Lauf" sheetId="1" r:id="r1"/></sheets></workbook>',
-    "xl/_rels/workbook.xml.rels": '<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">'
-    '<Relationship Id="r1" Type="http://schemas.openxmlformats.org/officeDocument/2006/relationships/worksheet" '
-    'Target="worksheets/sheet1.xml"/></Relationships>',
-}
-
-
-def packed(files: Mapping[str, str | bytes]) -> bytes:
-    """Return a zip archive."""
-    out = io.BytesIO()
-    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in files.items():
-            archive.writestr(name, content)
-    return out.getvalue()
 
 
 def excel() -> bytes:
@@ -58,8 +31,7 @@ def excel() -> bytes:
     cells = "".join(
         "<row>" + "".join(f'<c t="inlineStr"><is><t>{cell}</t></is></c>' for cell in row) + "</row>" for row in rows
     )
-    sheet = '<worksheet xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"><sheetData>'
-    return packed({**WORKBOOK, "xl/worksheets/sheet1.xml": f"{sheet}{cells}</sheetData></worksheet>"})
+    return workbook({"Lauf": cells})
 
 
 def tracker() -> str:
@@ -119,16 +91,8 @@ class WindowClient(Client):
 
     def cards(self, settled: bool = True) -> list[dict[str, Any]]:
         """Return all cards as a page sees them, once none of them waits any more."""
-        from websockets.sync.client import connect
-
         until = time.monotonic() + SETTLED_S
-        origin: Any = f"http://{self.netloc}"
-        with connect(
-            f"ws://{self.netloc}/window/events",
-            origin=origin,
-            additional_headers={"Cookie": self.cookie},
-            max_size=None,
-        ) as events:
+        with self.socket("/window/events") as events:
             order, cards = None, dict[str, dict[str, Any]]()
             while time.monotonic() < until:
                 message = json.loads(events.recv(timeout=SETTLED_S))

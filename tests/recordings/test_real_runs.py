@@ -11,13 +11,11 @@ import pytest
 
 from pipeline.analyse import Analysis, analyse
 from pipeline.bench.scene import Scene
-from pipeline.findings.finding import Finding
 from pipeline.track import Track
 
 RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "recordings"
 BARE = "AyushPandhi__Pandhi_Ayush_PHY224/position data.txt"
 DISC = "AyushPandhi__Pandhi_Ayush_PHY224/damped position.txt"
-LARGE_DISC = "filo0509__smorzamento/molla_durissima_discopieno_14.91945_0.2016_1.csv"
 OTHERS = (
     "pankaj9um__PHY224/undamped_point_data.txt",
     "pankaj9um__PHY224/undamped_point_data_set2.txt",
@@ -42,31 +40,6 @@ def analysed(name: str) -> Analysis:
     return analyse(track_of(name))
 
 
-@lru_cache
-def analysed_capstone() -> Analysis:
-    """Read the Capstone recording of a disc in plain Python, and analyse it."""
-    rows = [line.split(";") for line in (RECORDINGS / LARGE_DISC).read_text("utf-8").splitlines()[1:]]
-    t, y = (np.array([float(row[k]) for row in rows]) for k in (0, 1))
-    return analyse(Track.from_arrays(t, y))
-
-
-def mode_of(result: Analysis) -> Finding:
-    """Return the finding on the mode beside the main oscillation."""
-    (found,) = (finding for finding in result.findings if finding.code == "sideways_mode")
-    return found
-
-
-def test_mixed_drag_on_every_disc_run_of_two_minutes() -> None:
-    """Both runs need linear and quadratic drag together: each beyond five uncertainties, each alone far worse."""
-    assert mode_of(analysed(DISC)).values["amplitude_m"] == pytest.approx(9.6e-4, rel=0.05)
-    for result in (analysed(DISC), analysed_capstone()):
-        fits = result.damping.fits
-        mixed = fits["linear+quadratic"]
-        assert all(mixed.joint[name].value > 5.0 * mixed.joint[name].u for name in ("gamma", "beta"))
-        assert all(fits[name].bic > mixed.bic + 100.0 for name in ("linear", "quadratic", "friction"))
-        assert all(fits[name].reduced_chi2 > 30.0 for name in ("linear", "quadratic"))
-
-
 @pytest.mark.parametrize("name", [BARE, DISC, *OTHERS])
 def test_halves_of_a_run_agree_with_the_whole(name: str) -> None:
     """The period of either half lies within five uncertainties of the whole run's, real life included."""
@@ -81,7 +54,8 @@ def test_halves_of_a_run_agree_with_the_whole(name: str) -> None:
 @pytest.mark.parametrize("name", [BARE, DISC, *OTHERS])
 def test_every_bob_swings_sideways(name: str) -> None:
     """Each run holds a second mode at 0.58 to 0.61 of the main frequency: a pendulum of 0.33 to 0.4 m, the bench's."""
-    mode, main = mode_of(analysed(name)), analysed(name).estimates["frequency"].value
+    (mode,) = (finding for finding in analysed(name).findings if finding.code == "sideways_mode")
+    main = analysed(name).estimates["frequency"].value
     assert [effect.included for effect in analysed(name).effects if effect.name == "sideways_mode"] == [True]
     frequency = mode.values["frequency_hz"]
     assert 0.58 < frequency / main < 0.61

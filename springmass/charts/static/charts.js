@@ -110,7 +110,7 @@ class Panel {
   residuals(from, to) {
     let most = 0;
     for (const s of this.visible()) {
-      if (s.role !== "data" && s.role !== "band") continue;
+      if (!["data", "band", "law"].includes(s.role)) continue;
       for (let i = 0; i < s.x.length; i++) if (s.x[i] >= from && s.x[i] <= to && known(s.y[i])) most = Math.max(most, Math.abs(s.y[i]) + (s.role === "band" && known(s.u[i]) ? s.u[i] : 0));
     }
     return most > 0 && [-1.1 * most, 1.1 * most];

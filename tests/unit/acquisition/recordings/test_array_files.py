@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import io
 import json
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,6 +15,7 @@ import scipy.io
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.identify import open_recording
 from acquisition.recordings.reading import ReadOptions
+from tests.conformance.test_formats import packed
 from tests.unit.acquisition.recordings.test_grammars import T, X, holds
 
 Write = Callable[[Path], None]
@@ -164,11 +163,8 @@ N_ROWS = T.size
 def formulas() -> bytes:
     """Return a workbook that no spreadsheet has opened."""
     rows = "".join(f'<c r="A{i}"><f>B{i}*2</f><v></v></c>' for i in range(1, 40))
-    content = io.BytesIO()
-    with zipfile.ZipFile(content, "w") as archive:
-        archive.writestr("[Content_Types].xml", "<Types/>")
-        archive.writestr("xl/worksheets/sheet1.xml", f"<worksheet><sheetData>{rows}</sheetData></worksheet>")
-    return content.getvalue()
+    sheet = f"<worksheet><sheetData>{rows}</sheetData></worksheet>"
+    return packed({"[Content_Types].xml": "<Types/>", "xl/worksheets/sheet1.xml": sheet})
 
 
 def two_columns(head: str, values: np.ndarray = X) -> bytes:

@@ -192,13 +192,6 @@ def test_milliseconds_without_zeros_are_whole_numbers(tmp_path: Path, form: str)
     np.testing.assert_allclose(recording.samples.t, millis / 1000, atol=1e-9)
 
 
-def test_rows_that_come_newest_first_are_turned(tmp_path: Path) -> None:
-    """The times rise, and this is noted."""
-    recording = read(tmp_path, table([f"{t:.2f}" for t in T[::-1]], [f"{x:.3f}" for x in X[::-1]]))
-    holds(recording)
-    assert [each for each in recording.traps if each.code == "times_mended"]
-
-
 def test_three_rows_out_of_place_are_sorted(tmp_path: Path) -> None:
     """A row that arrived late takes its place; a time that is wrong stays flagged."""
     order = np.arange(N)
@@ -332,10 +325,14 @@ def test_annotated_csv_of_influxdb(tmp_path: Path) -> None:
     holds(read(tmp_path, "\n".join([head + rows[0], *rows[1:], ""]), unit="cm"))
 
 
-def test_an_answer_beats_the_heading(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("scale", "head", "answers"),
+    [(1, "Time (s);Position (m)", {"unit": "cm"}), (1000, "Time (s);Position (cm)", {"time_unit": "ms"})],
+)
+def test_an_answer_beats_the_heading(tmp_path: Path, scale: int, head: str, answers: dict[str, str]) -> None:
     """A person who states the unit knows better; it is noted."""
-    text = table([f"{t:.2f}" for t in T], [f"{x:.3f}" for x in X], head="Time (s);Position (m)")
-    recording = read(tmp_path, text, unit="cm")
+    text = table([f"{scale * t:.2f}" for t in T], [f"{x:.3f}" for x in X], head=head)
+    recording = read(tmp_path, text, **answers)
     holds(recording)
     assert [each for each in recording.traps if each.code == "unit_given"]
 
@@ -358,11 +355,3 @@ def test_jumps_by_a_turn_are_undone(tmp_path: Path, unit: str, turn: float, form
     steps = np.diff(true) * (np.pi / 180 if unit == "deg" else 1.0)
     np.testing.assert_allclose(np.diff(recording.samples.distance), steps, atol=turn * 1e-4)
     assert [each for each in recording.traps if each.code == "values_unwrapped"]
-
-
-def test_a_stated_unit_of_times_beats_the_heading(tmp_path: Path) -> None:
-    """It is used and noted."""
-    text = table([f"{1000 * t:.0f}" for t in T], [f"{x:.3f}" for x in X])
-    recording = read(tmp_path, text, time_unit="ms")
-    holds(recording)
-    assert [each for each in recording.traps if each.code == "unit_given"]

@@ -1,4 +1,4 @@
-"""Numbers are printed to the digits that their uncertainties allow, and travel together with their covariance."""
+"""Numbers are printed to the digits that their uncertainties allow."""
 
 from __future__ import annotations
 

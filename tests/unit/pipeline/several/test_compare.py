@@ -10,10 +10,14 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from pipeline.analyse import analyse
+from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
 from pipeline.several.compare import Comparison, SpringRun, compare_springs
 from pipeline.several.course import agreement
 from pipeline.several.masses import hooke
+from pipeline.track import Track
+from tests import synthetic
 
 
 def massless(runs: Sequence[SpringRun], mass_correlation: float = 0.0) -> Comparison:
@@ -43,6 +47,21 @@ def test_common_clock_widens_the_mean_and_not_the_test() -> None:
     assert shared.chi2 == pytest.approx(free.chi2, rel=1e-6)
     assert shared.largest_deviation == pytest.approx(free.largest_deviation, rel=1e-6)
     assert shared.spring_constant.u == pytest.approx(math.hypot(free.spring_constant.u, 6e-5 * 14.0), rel=1e-3)
+
+
+def test_each_constant_is_as_uncertain_as_in_its_own_analysis() -> None:
+    """A frequency that depends on the amplitude makes the constant uncertain alone and beside others."""
+    t, spring_mass = synthetic.times(60.0), Estimate(0.01, 1e-4, "kg")
+    scene = Scene(bob_mass_kg=Estimate(0.2, 2e-5, "kg"), spring_mass_kg=spring_mass)
+    runs = [
+        analyse(Track.from_arrays(t, synthetic.noisy(synthetic.Truth(gamma=0.02, kappa=kappa), t, 1e-4, 1)), scene)
+        for kappa in (0.0, -10.0)
+    ]
+    springs = [SpringRun.of(str(number), run.derived) for number, run in enumerate(runs)]
+    own = [run.estimates["spring_constant"].u for run in runs]
+    assert own[1] > 3.0 * own[0]
+    compared = compare_springs(springs, spring_mass_kg=spring_mass)
+    assert [each.u for each in compared.each] == pytest.approx(own, rel=0.01)
 
 
 def test_mean_is_that_of_generalised_least_squares() -> None:

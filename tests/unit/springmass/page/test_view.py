@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,6 @@ import pytest
 import springmass
 from acquisition.block import Block, SourceInfo
 from acquisition.clock import VirtualClock
-from acquisition.decoders.registry import get_family
 from acquisition.events import RunEnded, TimedOut, Triggered, Zeroed
 from pipeline.track import Track
 from springmass.loading.options import AnalysisOptions
@@ -20,6 +20,7 @@ from springmass.page.live_analysis import motion_message
 from springmass.runs.rolling import analysed, live_run
 from storage.recorder import Recorder
 from storage.wire_log.records import LogHeader, SensorEntry
+from tests.wire import line
 
 FAST = AnalysisOptions(accuracy="fast")
 
@@ -72,17 +73,9 @@ def test_the_fit_decays_as_its_law() -> None:
 
 def put_samples(recorder: Recorder, numbers: range) -> None:
     """Put readings at 100 Hz of a swing of 50 mm."""
-    encoder = get_family("line-protocol").encoder()
     for number in numbers:
-        distance_m = 0.3 + 0.05 * float(np.cos(0.083 * number))
-        frame = encoder.encode(
-            sequence=number,
-            device_us=10_000 * number,
-            echo_us=2e6 * distance_m / 344.0,
-            distance_m=distance_m,
-            temperature_c=20.0,
-        )
-        recorder.reads([(0, number * 10_000_000 + 1_000_000 * (number % 3), frame)])
+        data = line(number, 2e6 * (0.3 + 0.05 * math.cos(0.083 * number)) / 344.0)
+        recorder.reads([(0, number * 10_000_000 + 1_000_000 * (number % 3), data)])
 
 
 def test_marks_and_triggers_wait_for_the_first_sample(tmp_path: Path) -> None:

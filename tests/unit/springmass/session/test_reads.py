@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from acquisition.block import Flag, concatenate
-from acquisition.decoders.line_protocol import LineProtocolEncoder
 from acquisition.decoders.registry import get_family
 from acquisition.events import Event, Lost, Reopened, TimedOut
 from acquisition.live.decoding import SensorChain
@@ -22,6 +21,7 @@ from springmass.session.failures import Failures
 from springmass.session.reads import Tee
 from springmass.session.sensors import OpenSensor
 from storage.recorder import Recorder
+from tests.wire import line
 
 STEP_NS = 10_000_000
 
@@ -49,9 +49,7 @@ def chain() -> SensorChain:
 
 def frame(i: int) -> bytes:
     """Return one reading."""
-    return LineProtocolEncoder().encode(
-        sequence=i, device_us=i * 10_000, echo_us=1500.0 + i, distance_m=0.25, temperature_c=21.0
-    )
+    return line(i, 1500.0 + i)
 
 
 def met(numbers: Sequence[int]) -> np.ndarray:

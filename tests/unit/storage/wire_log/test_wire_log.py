@@ -1,4 +1,4 @@
-"""The wire log: what is appended comes back, and what the disk refuses is said."""
+"""The wire log: its layout, its header, what is no record of it, and how it is read while it grows."""
 
 from __future__ import annotations
 
