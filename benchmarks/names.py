@@ -29,7 +29,6 @@ KEPT = {
     "F8": SAME,
     "I8": SAME,
     "U8": SAME,
-    "MAD_TO_SIGMA": SAME,
     "Item": "a type variable: any item of a sequence",
     "Part": "a part of a sensor's data in a log, and the part of a recording that swings freely",
     "Samples": "those of a table in a file, and those of a track that were judged",

@@ -22,9 +22,7 @@ class Options:
     # if it has one, and "any" leaves the choice to the recording.
     stated: str | Law | None = None
     modes: bool = True  # whether to search for other oscillations beside the main one
-    rows: Literal["windows", "samples"] = (
-        "windows"  # whether amplitudes and phases of periods, or all samples are fitted
-    )
+    rows: Literal["windows", "samples"] = "windows"  # whether periods' amplitudes and phases, or all samples are fitted
 
     @property
     def known_law(self) -> str | Law | None:

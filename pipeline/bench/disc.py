@@ -98,10 +98,8 @@ def disc_rate(scene: Scene, amplitude_m: float, angular_frequency: float) -> tup
     """
     if scene.bob_mass_kg is None or scene.disc_diameter_m is None:
         raise SceneError("scene: drag is derived for a [bob] mass_kg with a [disc] diameter_m", "add both")
-    area, kc = (
-        0.25 * math.pi * scene.disc_diameter_m.value**2,
-        2.0 * math.pi * amplitude_m / scene.disc_diameter_m.value,
-    )
+    diameter = scene.disc_diameter_m.value
+    area, kc = 0.25 * math.pi * diameter**2, 2.0 * math.pi * amplitude_m / diameter
     drag_per_m = 0.5 * scene_air_density(scene) * disc_drag_coefficient(kc) * area / effective_mass_kg(scene)
     return 4.0 * drag_per_m * angular_frequency * amplitude_m / (3.0 * math.pi), kc
 
@@ -115,19 +113,14 @@ def derive_drag(scene: Scene, amplitude_m: float, seconds: float) -> DerivedDrag
     if scene.bob_mass_kg is None or scene.spring_constant_n_per_m is None or scene.disc_diameter_m is None:
         raise SceneError("scene: drag is derived for a [bob] mass_kg on a [spring] constant_n_per_m", "add both")
     omega = math.sqrt(scene.spring_constant_n_per_m.value / effective_mass_kg(scene))
-
-    def rate(amplitude: float) -> float:
-        return disc_rate(scene, amplitude, omega)[0]
-
-    values, first = np.zeros(2), 0.0
+    values, first, kc = np.zeros(2), 0.0, 0.0
     if amplitude_m > 0.0:
-        first = rate(amplitude_m)
+        first, kc = disc_rate(scene, amplitude_m, omega)
         left = (1.0 + first * seconds / 1.5) ** -1.5
         amplitudes = amplitude_m * np.geomspace(min(left, 0.9), 1.0, 40)
-        rates = np.array([rate(each) for each in amplitudes.tolist()])
+        rates = np.array([disc_rate(scene, each, omega)[0] for each in amplitudes.tolist()])
         columns = np.stack([np.ones(40), amplitudes / amplitude_m], axis=1) / rates[:, None]
         values = np.maximum(np.linalg.lstsq(columns, np.ones(40), rcond=None)[0], 0.0) / [1.0, amplitude_m]
     covariance = np.outer(U_SHED * values, U_SHED * values)  # the law's uncertainty moves both alike
     joint = Joint(("gamma_per_s", "beta_per_m_s"), values, covariance, ("1/s", "1/(m s)"))
-    kc = 2.0 * math.pi * amplitude_m / scene.disc_diameter_m.value
     return DerivedDrag(joint, f"disc at KC {kc:.3g}, {first:.2g} 1/s at the start ({SOURCES})")

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from pipeline.bench.disc import added_mass_kg
 from pipeline.bench.scene import BENCH_KEYS, PLACES, Scene
 from pipeline.bench.spring import GRAVITY_M_PER_S2
-from pipeline.bench.typed import readings
+from pipeline.bench.typed import other_reading
 from pipeline.numerics.estimate import Estimate
 
 USUAL: dict[str, tuple[float, float]] = {
@@ -23,9 +22,6 @@ USUAL: dict[str, tuple[float, float]] = {
     "start_velocity_m_per_s": (-10.0, 10.0),
 }
 """Ranges of a bench: the air pressures at which people live, and the distances and speeds of a hall."""
-# Share of the bob's mass that may swing along as air: by the formula of Lamb (1932) it is 11 % for a disc of 30 cm on a
-# bob of 0.1 kg.
-AIR_SHARE = 0.5
 # Bobs that a spring may weigh. It is chosen: ten times the heaviest laboratory spring, 50 g, on a bob of 0.1 kg.
 SPRING_BOBS = 5.0
 LONGEST_RANGE_M = 10.0  # of a rangefinder (data sheet of the MaxBotix XL-MaxSonar); no spring sags further
@@ -62,9 +58,9 @@ def slips(scene: Scene) -> tuple[Slip, ...]:
         value = estimate.value
         usual, effect = _usual(scene, quantity.attribute)
         if not usual[0] <= value <= usual[1]:
-            others = [each for each in readings(value, quantity.unit, usual) if each.unit != quantity.unit]
-            asked = f": {value:g} {quantity.unit} or {value:g} {others[0].unit}?" if others else ""
-            decides = not others or not 1.0 / DECIDING < others[0].ratio < DECIDING
+            other = other_reading(value, quantity.unit, usual)
+            asked = "" if other is None else f": {value:g} {quantity.unit} or {value:g} {other.unit}?"
+            decides = other is None or not 1.0 / DECIDING < other.ratio < DECIDING
             beyond = f"is beyond {usual[0]:g} to {usual[1]:g} {quantity.unit}"
             words = f"{value:g} {effect or beyond}{asked}"
             found.append(Slip(quantity.attribute, words, bool(asked), decides))
@@ -75,13 +71,9 @@ def slips(scene: Scene) -> tuple[Slip, ...]:
 
 
 def _usual(scene: Scene, attribute: str) -> tuple[tuple[float, float], str]:
-    """Return the usual range of a value beside the others of its scene, and what a value beyond it would do."""
+    """Return the usual range of a value next to the mass of its bob, and what a value beyond it would be."""
     bob, low, high = scene.bob_mass_kg, *USUAL.get(attribute, (-math.inf, math.inf))
-    if attribute == "disc_diameter_m" and scene.disc_diameter_m is not None:
-        if bob is not None and (air := added_mass_kg(scene)) > AIR_SHARE * bob.value:
-            # The air that a disc carries along grows with the third power of its diameter.
-            most = scene.disc_diameter_m.value * (AIR_SHARE * bob.value / air) ** (1.0 / 3.0)
-            return (low, min(high, most)), f"would carry along {air:.3g} kg of air, with a bob of {bob.value:.3g} kg"
+    if attribute == "disc_diameter_m":
         return (low, high), "is larger than a bench"
     if attribute == "spring_mass_kg" and bob is not None:
         return (0.0, SPRING_BOBS * bob.value), f"is a spring heavier than {SPRING_BOBS:g} bobs"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
+from pipeline.bench.air import ZERO_CELSIUS_K
 from pipeline.numerics.estimate import Estimate
 
 
@@ -16,19 +17,18 @@ class Scale(NamedTuple):
 
 
 # Pound, inch and atmosphere are exact by definition; the pressure of mercury is that of NIST SP 811, appendix B.
-_POUND_KG, _ATMOSPHERE_PA = 0.45359237, 101325.0
 _FACTORS = {
-    "kg": {"kg": 1.0, "g": 1e-3, "mg": 1e-6, "lb": _POUND_KG, "oz": _POUND_KG / 16},
+    "kg": {"kg": 1.0, "g": 1e-3, "mg": 1e-6, "lb": 0.45359237, "oz": 0.45359237 / 16},
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048},
     "N/m": {"N/m": 1.0, "N/cm": 1e2, "N/mm": 1e3, "mN/mm": 1.0, "mN/m": 1e-3},
     "degC": {"degC": 1.0, "C": 1.0, "K": 1.0, "degF": 5.0 / 9.0, "F": 5.0 / 9.0},
     "Pa": {"Pa": 1.0, "hPa": 1e2, "mbar": 1e2, "kPa": 1e3, "bar": 1e5}
-    | {"mmHg": 133.3224, "Torr": _ATMOSPHERE_PA / 760.0, "inHg": 3386.389, "atm": _ATMOSPHERE_PA},
+    | {"mmHg": 133.3224, "Torr": 101325.0 / 760.0, "inHg": 3386.389, "atm": 101325.0},
     "": {"%": 1e-2},
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
     "m/s": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
 }
-_ZEROS = {"K": -273.15, "degF": -160.0 / 9.0, "F": -160.0 / 9.0}
+_ZEROS = {"K": -ZERO_CELSIUS_K, "degF": -160.0 / 9.0, "F": -160.0 / 9.0}
 _NO_NUMBER = "must be a number, with its standard uncertainty as 0.2007+/-0.0001 or 0.2007(1)"
 _SIGNS = str.maketrans({"\u2212": "-", "\u2013": "-", "µ": "u", "μ": "u", "\u00a0": " ", "\u202f": " "})
 _FLOAT = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -87,17 +87,17 @@ class UnitReading(NamedTuple):
     ratio: float
 
 
-def readings(value: float, unit: str, usual: tuple[float, float]) -> list[UnitReading]:
-    """Return the units in which the bare number would be a usual value, those of a bench first.
+def other_reading(value: float, unit: str, usual: tuple[float, float]) -> UnitReading | None:
+    """Return the other unit in which the bare number would be a usual value, that of a bench first; None without any.
 
-    >>> readings(10.2, "m", (0.0, 1.0))[0].unit, readings(1005.0, "Pa", (5e4, 1.1e5))[0].unit
+    >>> other_reading(10.2, "m", (0.0, 1.0)).unit, other_reading(1005.0, "Pa", (5e4, 1.1e5)).unit
     ('cm', 'hPa')
-    >>> readings(294.15, "degC", (-30.0, 50.0))[0].unit
+    >>> other_reading(294.15, "degC", (-30.0, 50.0)).unit
     'K'
     """
     within = [
         UnitReading(name, (scale.factor * value + scale.zero) / value)
         for name, scale in scales_of(unit).items()
-        if value and usual[0] <= scale.factor * value + scale.zero <= usual[1]
+        if value and name != unit and usual[0] <= scale.factor * value + scale.zero <= usual[1]
     ]
-    return sorted(within, key=lambda each: each.unit not in ("g", "cm", "hPa", "K"))
+    return min(within, key=lambda each: each.unit not in ("g", "cm", "hPa", "K"), default=None)

@@ -13,7 +13,7 @@ from pipeline.windows.demodulate import CLIP_SIGMAS, Windows
 # in a thousand form a cluster at a given one with a probability of 1e-5.
 CLUSTER = 3
 COUNTED = {
-    str(quality.name).lower(): int(quality)
+    str(quality.name).lower(): np.uint8(quality)
     for quality in Quality
     if quality not in (Quality.GAP_BEFORE, Quality.MALFORMED)
 }
@@ -25,10 +25,8 @@ def count_quality(flags: U8) -> dict[str, int]:
     >>> count_quality(np.array([0, 1, 2, 2], np.uint8))["false_echo"]
     2
     """
-    counts = np.bincount(flags) if flags.any() else np.array([flags.size])
-    held = [(value, count) for value, count in enumerate(counts.tolist()) if count]
-    found = {name: sum(count for value, count in held if value & bit) for name, bit in COUNTED.items()}
-    return {**found, "used": sum(count for value, count in held if not value & int(UNUSABLE))}
+    found = {name: int(np.count_nonzero(flags & bit)) for name, bit in COUNTED.items()}
+    return {**found, "used": int(np.count_nonzero((flags & UNUSABLE) == 0))}
 
 
 def echoes_by_chance(before: U8, windows: Windows) -> bool:

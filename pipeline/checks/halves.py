@@ -14,13 +14,10 @@ from pipeline.motion.fitted import Oscillation
 from pipeline.motion.kinds import Motion
 from pipeline.notice import Notice
 from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.least_squares import CENTRAL_STEP
 from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_CURVE
 from pipeline.numerics.regression import Scatter, beyond, decompose
 from pipeline.track import F8
-
-# Share of the information on a combination of parameters below which the other half does not determine it. It is above
-# the error of numerical derivatives in double precision, 4e-11 to 1e-7 (Press et al. (2007), section 5.7).
-UNDETERMINED = 1e-6
 
 
 class Difference(NamedTuple):
@@ -59,10 +56,11 @@ def difference(residual: F8, slopes: F8, correlation: float) -> Difference | Non
     one_half = slopes.copy()
     one_half[:first] = 0.0
     other = beyond(basis, one_half)
-    other = other[:, np.linalg.norm(other, axis=0) > UNDETERMINED]
+    # The other half does not determine what it contributes less to than the errors of numerical derivatives.
+    other = other[:, np.linalg.norm(other, axis=0) > CENTRAL_STEP]
     if not other.size:
         return None
-    apart, _, _ = decompose(other, UNDETERMINED)
+    apart, _, _ = decompose(other, CENTRAL_STEP)
     part = apart.T @ beyond(basis, residual[:, None])[:, 0]
     return Difference(float(part @ part) / correlation, part.size)
 

@@ -15,7 +15,6 @@ import numpy as np
 from pipeline.damping.law_fit import LawFit
 from pipeline.damping.laws import Drag, Law
 from pipeline.damping.select import Damping
-from pipeline.track import F8
 
 # Prior u of the power of the drag about 1: friction and quadratic drag have 0.77 times the probability of linear drag.
 SPREAD_OF_POWER = 1.4
@@ -33,7 +32,7 @@ class Weighted:
 def average_over_laws(damping: Damping, amplitude: float) -> tuple[Weighted, ...]:
     """Return the laws over which quantities are averaged, first the law whose coefficients are stated.
 
-    A stated law that is selected is the only one. ``amplitude_m`` is the mean amplitude of the record.
+    A stated law that is selected is the only one. ``amplitude`` is the mean one of the record.
 
     The law of linear and quadratic drag together contains "none", "linear" and "quadratic" as special cases. If one of
     these is selected, a term was not detected, but it need not be zero. So unless the recording contradicts it, this
@@ -101,13 +100,6 @@ def _with_prior(mixed: LawFit, linear: LawFit | None, amplitude: float) -> LawFi
     values, covariance = np.zeros(3), np.zeros((3, 3))
     # If chi-square rejected the exponential, its covariance was widened. Here it is part of a law that fits.
     values[:2], covariance[:2, :2] = linear.joint.values, linear.joint.covariance / linear.widening
-    joint = replace(
-        mixed.joint,
-        values=_between(values, mixed.joint.values, share),
-        covariance=_between(covariance, mixed.joint.covariance, share),
-    )
-    return replace(mixed, joint=joint)
-
-
-def _between(one: F8, other: F8, share: float) -> F8:
-    return np.asarray(one + share * (other - one))
+    values += share * (mixed.joint.values - values)
+    covariance += share * (mixed.joint.covariance - covariance)
+    return replace(mixed, joint=replace(mixed.joint, values=values, covariance=covariance))

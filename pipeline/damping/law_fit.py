@@ -89,15 +89,17 @@ class LawFit:
 
     def u_amplitude(self, t: F8) -> F8:
         """Return the standard uncertainty (n,) of :meth:`amplitude`."""
-        _, jacobian = self.law.curve(t, self.joint.values)
-        variance = np.einsum("ni,ij,nj->n", jacobian, self.joint.covariance, jacobian)
+        return self.u_of(self.law.curve(t, self.joint.values)[1].T)
+
+    def u_of(self, slopes: F8) -> F8:
+        """Return the standard uncertainties (n,) of numbers from their derivatives (p, n) by the parameters."""
+        variance = np.einsum("in,ij,jn->n", slopes, self.joint.covariance, slopes)
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
     def rates(self, amplitude: F8) -> tuple[F8, F8]:
         """Return -dA/dt at amplitudes (n,) in m, and its standard uncertainty."""
         gradient = self.by_parameters(lambda theta: self.law.rate(amplitude, theta))
-        variance = np.einsum("in,ij,jn->n", gradient, self.joint.covariance, gradient)
-        return -self.law.rate(amplitude, self.joint.values), np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+        return -self.law.rate(amplitude, self.joint.values), self.u_of(gradient)
 
     def rate_at_start(self) -> float:
         """Return the damping rate at the start, :math:`-\\dot A/A`, 1/s."""
@@ -118,12 +120,10 @@ class LawFit:
 
     def damping_rate(self) -> Estimate:
         """Return :meth:`rate_at_start` with its uncertainty."""
-        slopes = self.slopes_of_rate()
-        variance = float(slopes @ self.joint.covariance @ slopes)
-        return Estimate(self.rate_at_start(), math.sqrt(max(variance, 0.0)), "1/s")
+        return Estimate(self.rate_at_start(), float(self.u_of(self.slopes_of_rate()[:, None])[0]), "1/s")
 
 
-def joint_of(law: Law, theta: F8, covariance: F8, unit: str = "m") -> Joint:
+def joint_of_law(law: Law, theta: F8, covariance: F8, unit: str) -> Joint:
     """Return a law's parameters (p,) and their covariance with names, and units for a record in a unit."""
     return Joint(tuple(law.parameters), theta, covariance, units_of(law, unit))
 
@@ -208,7 +208,7 @@ def weigh(
         rejection = "misfit"
     elif np.any(fit.values < -NEGATIVE * np.sqrt(np.diag(covariance))):
         rejection = "negative"
-    return LawFit(law, joint_of(law, fit.values, covariance, unit), reduced, dof, bic, rejection)
+    return LawFit(law, joint_of_law(law, fit.values, covariance, unit), reduced, dof, bic, rejection)
 
 
 def without_beaten(fits: Mapping[str, LawFit]) -> dict[str, LawFit]:

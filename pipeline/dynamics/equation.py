@@ -17,10 +17,10 @@ from pipeline.bench.disc import effective_mass_kg
 from pipeline.bench.scene import Scene
 from pipeline.errors import DynamicsError, SceneError
 from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.levels import LARGEST
 
 Real = Any  # a float, or an array of floats for several states
 
-LARGEST = 1e30  # of any number, so that no product of a few of them leaves the range of IEEE 754 doubles
 _AMPLITUDE_TO_DRAG = 3.0 * math.pi / 4.0  # b = (3 pi / 4) beta / omega, from the loss per cycle: arXiv:2502.07458
 
 

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.dynamics.equation import LARGEST, Problem
+from pipeline.dynamics.equation import Problem
 from pipeline.errors import DynamicsError
+from pipeline.numerics.levels import LARGEST
 from pipeline.track import F8
 
 RANAWAY = math.sqrt(math.sqrt(np.finfo(np.float64).max))  # m or m/s, whose fourth power is still a number

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.polynomial import Legendre
 
-from pipeline.damping.law_fit import LawFit, joint_of
+from pipeline.damping.law_fit import LawFit, joint_of_law
 from pipeline.damping.laws import LAWS, Law
 from pipeline.damping.select import Damping
 from pipeline.motion.averaged import Averaged, assembled
@@ -164,7 +164,7 @@ def _refined(damping: Damping, fits: Mapping[str, _OfLaw]) -> Damping:
     changed = {}
     for name, one in fits.items():
         size, unit = len(one.model.law.parameters), damping.fits[name].joint.units[0]
-        joint = joint_of(one.model.law, one.fit.values[:size], one.covariance[:size, :size], unit)
+        joint = joint_of_law(one.model.law, one.fit.values[:size], one.covariance[:size, :size], unit)
         changed[name] = replace(damping.fits[name], joint=joint)
     return replace(damping, fits={**damping.fits, **changed})
 
@@ -175,7 +175,7 @@ def _selected(damping: Damping, fits: Mapping[str, _OfLaw]) -> Damping:
     for name in sorted(fits, key=lambda name: len(LAWS[name].parameters)):
         one, law = fits[name], LAWS[name]
         size, count = len(law.parameters), float(one.fit.residual.size)
-        joint = joint_of(law, one.fit.values[:size], one.covariance[:size, :size], damping.best.joint.units[0])
+        joint = joint_of_law(law, one.fit.values[:size], one.covariance[:size, :size], damping.best.joint.units[0])
         bic = count * math.log(max(one.fit.cost, 1e-300) / count) + one.fit.values.size * math.log(count)
         found[name] = LawFit(law, joint, 1.0, one.dof, bic, "")
     least = min(one.bic for one in found.values())

@@ -23,9 +23,9 @@ from pipeline.notice import Refusal
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.least_squares import CENTRAL_STEP, Fit
-from pipeline.numerics.levels import FEWEST_FOR_CURVE, NEGLIGIBLE, STRONG, VERY_STRONG
+from pipeline.numerics.levels import FEWEST_FOR_CURVE, LARGEST, NEGLIGIBLE, STRONG, VERY_STRONG
 from pipeline.numerics.regression import correlation_length, covariance_of
-from pipeline.samples.condition import LARGEST_VALUE, Samples
+from pipeline.samples.condition import Samples
 from pipeline.track import F8, Quality
 
 Shape = Callable[[F8, F8], F8]
@@ -146,9 +146,9 @@ def best_decay(rows: Rows, starts: F8) -> Decay | None:
 def lone_exponential(rows: Rows, rate: float) -> tuple[float, float]:
     """Fit :math:`o + p e^{-rt}` from a start value of the rate (in 1/s), and return r and chi-square.
 
-    If the record shows no such rate the search diverges; r is limited by :data:`LARGEST_VALUE`.
+    If the record shows no such rate the search diverges; r is limited by :data:`LARGEST`.
     """
-    end, most = LONE.fit(rows, np.array([math.log(rate)])), math.log(LARGEST_VALUE)
+    end, most = LONE.fit(rows, np.array([math.log(rate)])), math.log(LARGEST)
     return math.exp(min(max(float(end.values[-1]), -most), most)), end.cost
 
 

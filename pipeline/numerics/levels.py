@@ -42,6 +42,9 @@ ROUNDS = 5
 # Differences of BIC from which evidence is worth more than a bare mention, strong, and very strong: R. E. Kass,
 # A. E. Raftery, J. Am. Stat. Assoc. 90 (1995) 773.
 BARE_MENTION, STRONG, VERY_STRONG = 2.0, 6.0, 10.0
+# Magnitude of a number beyond which it is no measured value, and no product of a few leaves the range of doubles, 1e308
+# by definition (IEEE 754).
+LARGEST = 1e30
 # Probability of an upper limit, and weight of a law beside which all others are unlikely; the usual level of a test.
 LIMIT = 0.95
 # Coverage probability of an expanded uncertainty, with k = 2.00 for many degrees of freedom (EA-4/02 M:2022, annex E).

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.numerics.levels import normal_quantile
 from pipeline.track import F8
 
-MAD_TO_SIGMA = 1.482602218505602  # 1 / Phi^-1(3/4): P. J. Rousseeuw, C. Croux, J. Am. Stat. Assoc. 88 (1993) 1273
-
-# Relative standard uncertainty of that estimate from n normal deviates, times the root of n: its efficiency is 37 %,
-# Rousseeuw and Croux (1993). It is also the relative change per share of outliers: 0.5/(2 phi(0.6745) 0.6745).
-U_OF_MAD = 1.17
+# The median absolute value of normal deviates, over their standard deviation: P. J. Rousseeuw, C. Croux, J. Am. Stat.
+# Assoc. 88 (1993) 1273.
+_MAD = normal_quantile(0.5)
+# Relative standard uncertainty of a standard deviation from the median of n normal deviates, times the root of n: the
+# efficiency is 37 %. It is also the relative change per share of outliers.
+U_OF_MAD = 0.25 / (NormalDist().pdf(_MAD) * _MAD)
 
 
 def median(x: NDArray[np.number[Any]]) -> float:
@@ -30,4 +33,4 @@ def mad_sigma(deviation: F8) -> float:
     >>> round(mad_sigma(np.array([-0.3, 0.1, 0.2])), 3)
     0.297
     """
-    return MAD_TO_SIGMA * median(np.abs(deviation))
+    return median(np.abs(deviation)) / _MAD

@@ -6,11 +6,13 @@ import math
 from functools import cached_property
 from typing import Any
 
+from uncertainties import wrap
+
 from pipeline.bench.air import U_DENSITY, U_SOUND, U_VISCOSITY, air_density, air_viscosity, speed_of_sound
 from pipeline.bench.disc import scene_air
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
-from pipeline.results.budget import Inputs, function_of
+from pipeline.results.budget import Inputs
 from pipeline.track import Track
 
 
@@ -35,11 +37,11 @@ class Ambient:
     @cached_property
     def density(self) -> Any:
         """Density of the air, kg/m^3."""
-        return function_of(air_density, self._temperature, self._pressure, self._humidity) * self._density_formula
+        return wrap(air_density)(self._temperature, self._pressure, self._humidity) * self._density_formula
 
     def viscosity(self) -> Any:
         """Return the dynamic viscosity of the air, Pa s."""
-        return function_of(air_viscosity, self._temperature, self._pressure) * self._viscosity_formula
+        return wrap(air_viscosity)(self._temperature, self._pressure) * self._viscosity_formula
 
     def scale(self, track: Track) -> Any:
         """Return the factor on all distances: 1, with the uncertainty of the speed of sound or of a calibration.
@@ -53,7 +55,7 @@ class Ambient:
             return self._inputs.add("calibrated_scale", Estimate(1.0, track.u_scale), "B")
         if not self._sensor and not track.sonic:
             return 1.0
-        sound = function_of(speed_of_sound, self._temperature, self._pressure, self._humidity)
+        sound = wrap(speed_of_sound)(self._temperature, self._pressure, self._humidity)
         actual = Estimate.of_variable(sound, "m/s").value
         factor = sound / actual * self._inputs.add("speed_of_sound_formula", Estimate(1.0, U_SOUND), "B")
         if track.speed_of_sound_m_per_s is not None:

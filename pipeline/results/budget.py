@@ -7,11 +7,12 @@ ordinary arithmetic contains its dependence on each input, including correlation
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
+from uncertainties import UFloat, correlated_values, ufloat
 
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate, Joint
@@ -84,8 +85,6 @@ class Inputs:
 
     def add(self, name: str, estimate: Estimate, kind: Evaluation, dof: float = math.inf) -> Any:
         """Return an input as a variable, or as a plain number if it is exact."""
-        from uncertainties import ufloat
-
         self._register(name, kind, dof, estimate)
         if not (math.isfinite(estimate.u) and estimate.u >= 0):
             raise AnalysisError(
@@ -95,22 +94,16 @@ class Inputs:
 
     def add_joint(self, name: str, joint: Joint, dof: float = math.inf) -> list[Any]:
         """Return what a fit of the record gives together as correlated variables, one line in every budget."""
-        from uncertainties import correlated_values
-
         self._register(name, "A", dof)
         return list(correlated_values(joint.values.tolist(), joint.covariance, [name] * joint.values.size))
 
     def add_errors(self, name: str, sizes: Mapping[str, float]) -> dict[str, Any]:
         """Return a variable of mean 0 for each standard uncertainty; they are one line in every budget."""
-        from uncertainties import ufloat
-
         self._register(name, "B")
         return {key: ufloat(0.0, u, name) if u > 0 else 0.0 for key, u in sizes.items()}
 
     def budget(self, quantity: str, x: Any, unit: str) -> Budget:
         """Return the budget of a result calculated from these inputs."""
-        from uncertainties import UFloat
-
         # Sorted by name, because sums of floats depend on their order, and the order of the mapping on addresses.
         by_input = x.derivatives if isinstance(x, UFloat) else {}
         parts = sorted((of.tag, abs(float(slope) * of.std_dev), float(slope)) for of, slope in by_input.items())
@@ -156,10 +149,3 @@ def joint_of(estimates: Mapping[str, Estimate]) -> Joint:
     covariance = parts @ parts.T
     values = np.array([estimate.value for estimate in each])
     return Joint(tuple(estimates), values, covariance, tuple(estimate.unit for estimate in each))
-
-
-def function_of(formula: Callable[..., float], *xs: Any) -> Any:
-    """Return the value of a formula of variables as a variable, with derivatives by central differences."""
-    from uncertainties import wrap
-
-    return wrap(formula)(*xs)

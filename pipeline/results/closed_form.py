@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from uncertainties import umath
+
 from pipeline.motion.at_rest import Rest
 from pipeline.motion.lines import TwoModes
 from pipeline.motion.relaxation import Relaxation
@@ -27,8 +29,6 @@ def closed_form(
 
 
 def _relaxation(motion: Relaxation, x: dict[str, Any], rate: Any) -> tuple[dict[str, Any], dict[str, Any]]:
-    from uncertainties import umath
-
     g = umath.exp(x["log_rate"])
     w = g**2 if motion.kind == "critical" else umath.exp(x["log_stiffness"])
     if motion.kind == "critical":

@@ -17,18 +17,18 @@ import numpy as np
 from pipeline.damping.average import scaled
 from pipeline.damping.law_fit import LawFit
 from pipeline.motion.fitted import Oscillation
-from pipeline.numerics.least_squares import EPS, minimise, remembering
+from pipeline.numerics.least_squares import EPS, PRECISION, minimise, remembering
 from pipeline.numerics.levels import NEGLIGIBLE
 from pipeline.numerics.regression import chi2_quantile
 from pipeline.results.derive import in_true_units
 from pipeline.track import F8
 
 # Number of directions in which a border is searched; straight lines between them miss an ellipse by 0.2 % of its size,
-# by the formula 1 - cos(pi/48). Every fourth one, which is chosen, shows whether chi-square is a parabola.
-DIRECTIONS, PROBED = 48, 4
-# Standard uncertainties by which a border is uncertain, and beyond which none is searched because chi-square does not
-# bound the parameter; both are far from what a figure shows, 0.1 and 5: each is chosen.
-SEARCHED, UNBOUNDED = 1e-3, 50.0
+# by the formula 1 - cos(pi/48).
+DIRECTIONS = 48
+# Standard uncertainties beyond which no border is searched because chi-square does not bound the parameter. The number
+# is chosen, ten times what a figure shows.
+UNBOUNDED = 50.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,10 +69,10 @@ def contour(motion: Oscillation, scales: tuple[float, float], shares: tuple[floa
         return np.stack([found[joint.names[i]][0] for i in pair], axis=-1)
 
     if motion.method == "windows":
-        rise, far = _rise(motion, fit, pair), levels.max()
-        apart = [_radius(rise, step, far) - math.sqrt(far) for step in reach[::PROBED]]
-        if not max(map(abs, apart)) <= NEGLIGIBLE:
-            profiles = border(np.array([[_radius(rise, step, level) for step in reach] for level in levels]))
+        rise = _rise(motion, fit, pair)
+        found = np.array([[_radius(rise, step, level) for step in reach] for level in levels])
+        if not np.max(np.abs(found - radii)) <= NEGLIGIBLE:
+            profiles = border(found)
     return Contour(
         names=(joint.names[first], joint.names[second]),
         units=(joint.units[first], joint.units[second]),
@@ -132,4 +132,4 @@ def _radius(rise: Callable[[F8], float], reach: F8, level: float) -> float:
             far *= 1.5
             if far > UNBOUNDED:
                 return math.nan
-        return float(brentq(above, 0.0, far, xtol=SEARCHED)) if math.isfinite(end) else math.nan
+        return float(brentq(above, 0.0, far, xtol=PRECISION)) if math.isfinite(end) else math.nan

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.checks.residual import PARTS
 from pipeline.damping.average import Weighted
 from pipeline.damping.law_fit import LawFit
 from pipeline.damping.laws.drag import COEFFICIENTS
@@ -28,8 +29,6 @@ from pipeline.windows.demodulate import Windows
 
 # Number of points of a drawn curve: by the formula h^2/8, lines between them miss a decay to e^-7 by 2e-4 of its value.
 CURVE_POINTS = 200
-# Maximum number of groups of windows whose local slopes are drawn with the curve; it is chosen, and no result uses it.
-GROUPS = 12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,8 +100,7 @@ def drag_curve(damping: Damping, windows: Windows, factor: Estimate, laws: Seque
     variance = (y * factor.u / factor.value) ** 2
     for fit, weight in ((one.fit, one.weight) for one in laws):
         gradient = fit.by_parameters(functools.partial(coefficient, fit))
-        own = np.einsum("in,ij,jn->n", gradient, fit.joint.covariance, gradient)
-        variance += weight * (np.maximum(own, 0.0) + (coefficient(fit, fit.joint.values) - y) ** 2)
+        variance += weight * (fit.u_of(gradient) ** 2 + (coefficient(fit, fit.joint.values) - y) ** 2)
     return Curve(x, y, np.sqrt(variance), "", *_local_drag(damping, windows, factor.value))
 
 
@@ -114,7 +112,7 @@ def _local_drag(damping: Damping, windows: Windows, factor: float) -> tuple[F8, 
     """Return amplitude, drag coefficient and its scatter for groups of windows, without assuming a law of drag."""
     kept = damping.scatter.kept
     t, amplitude, u = windows.t[kept], windows.amplitude[kept], damping.scatter.u[kept]
-    groups = min(GROUPS, t.size // FEWEST_FOR_LINE)
+    groups = min(PARTS, t.size // FEWEST_FOR_LINE)
     rows = []
     for part in np.array_split(np.arange(t.size), groups) if groups else []:
         a, middle = amplitude[part], float(np.mean(t[part]))

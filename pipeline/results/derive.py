@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from uncertainties import correlated_values, wrap
 
 from pipeline.bench.clock_rate import clock_rate
 from pipeline.bench.scene import Scene
@@ -32,7 +33,7 @@ from pipeline.numerics.levels import LIMIT
 from pipeline.numerics.robust import U_OF_MAD, mad_sigma
 from pipeline.quantities import QUANTITIES
 from pipeline.results.ambient import Ambient
-from pipeline.results.budget import Budget, Inputs, function_of, joint_of
+from pipeline.results.budget import Budget, Inputs, joint_of
 from pipeline.results.closed_form import closed_form
 from pipeline.results.effects import Effect
 from pipeline.results.formulas import solve
@@ -81,8 +82,6 @@ class Derived:
         Those of the law of the results are the results themselves; coefficients that are not determined are upper
         limits.
         """
-        from uncertainties import correlated_values
-
         coefficients = self.coefficients if self.law_of_coefficients == fit.name else {}
         if self.law == fit.name:
             return {"A0": self.estimates["amplitude"], **coefficients}
@@ -165,7 +164,6 @@ def _closed(
     known = {
         "time_factor": rate,
         "rest_position": x["rest"],
-        "sensor_zero": inputs.add("sensor_zero", Estimate(0.0, track.u_offset_m, track.unit), "B"),
         "offset_misfit": 0.0,
         "noise_of_samples": inputs.add("noise", motion.noise, "A", motion.dof),
     }
@@ -232,7 +230,6 @@ def _of_motion(
         "crest": _crest(fitted, unit, inputs),
         "stiffness_factor": 1.0 + 2.0 * inputs.add("mean_frequency", Estimate(0.0, apart, ""), "B") if apart else 1.0,
         "rest_position": inputs.add("rest_position", rest.mean, "A", free),
-        "sensor_zero": inputs.add("sensor_zero", Estimate(0.0, track.u_offset_m, unit), "B"),
         "offset_misfit": amiss["offset"],
         "start_phase": _start_phase(phase, slope, inputs, free),
         "phase_misfit": amiss["phase"],
@@ -258,6 +255,7 @@ def _of_scene(track: Track, scene: Scene, included: set[str], inputs: Inputs) ->
         "air": air,
         "known_air": air if air.known else None,
         "distance_scale": air.scale(track) if track.unit == "m" else 1.0,
+        "sensor_zero": inputs.add("sensor_zero", Estimate(0.0, track.u_offset_m, track.unit), "B"),
         "sensor_filter": _filter(SensorFilter.of(scene, track.rate_hz), inputs),
         "pendulum_length": stated("pendulum_length", scene.pendulum_length_m),
         "disc_diameter": stated("disc_diameter", scene.disc_diameter_m),
@@ -300,7 +298,7 @@ def _filter(smoothing: SensorFilter | None, inputs: Inputs) -> Callable[[Any], t
         inputs.add(name, size, "B") if size.u > 0.0 else size.value
         for name, size in (("sensor_mean_samples", smoothing.mean_samples), ("sensor_lag", smoothing.lag_s))
     ]
-    return lambda omega: (function_of(smoothing.gain, omega, *sizes), function_of(smoothing.delay, omega, *sizes))
+    return lambda omega: (wrap(smoothing.gain)(omega, *sizes), wrap(smoothing.delay)(omega, *sizes))
 
 
 class _Laws:

@@ -27,7 +27,6 @@ from pipeline.numerics.levels import NEGLIGIBLE
 from pipeline.track import Track
 from pipeline.units import amount
 
-SPEED_OF_SOUND_OF_RECORD = 344.0  # m/s, by definition of MotionSensor.vi, which wrote the recordings
 STEEL_KG_PER_M3 = 7850.0  # EN 1993-1-2 (2005), 3.2.2
 # Relative decrease of the modulus of rigidity of steel with temperature, 1/K: G. H. Keulegan, M. R. Houseman, J. Res.
 # NBS 10 (1933) 289.
@@ -236,20 +235,21 @@ def _buoyancy(scene: Scene, omega: float, length_m: float, unit: str) -> Effect:
 
 
 def _speed_of_sound(scene: Scene, track: Track) -> Effect:
-    record, shift = track.speed_of_sound_m_per_s or SPEED_OF_SOUND_OF_RECORD, None
+    record, shift, included = track.speed_of_sound_m_per_s, None, False
     if track.u_scale > 0:
         why = "the distances were calibrated, so the calibration's uncertainty stands in its place"
     elif not track.sonic and not scene.tells_of_sensor:
-        why = "no rangefinder is known, so its 0.18 %/K stand in no uncertainty; [sensor] in the scene adds them"
+        why = "no rangefinder is known, so its 0.18 %/K stand in no uncertainty; a sensor in the scene adds them"
     elif scene.air_temperature_c is None:
         why = "the scene gives no air temperature, so a room's 20 +- 3 degC count, 0.5 % in the scale"
     else:
-        shift = speed_of_sound(*(each.value for each in scene_air(scene))) / record - 1.0
-        why = (
-            f"relative to the {record:g} m/s of the record, uncorrected; the air's uncertainty stands in the distances'"
-        )
+        included, why = True, "the record does not state the one that it used"
+        if record is not None:
+            shift = speed_of_sound(*(each.value for each in scene_air(scene))) / record - 1.0
+            why = f"relative to the {record:g} m/s of the record, uncorrected"
+        why += "; the air's uncertainty stands in the distances'"
     why += "; it scales every distance alike: amplitude and beta, not the spring constant"
-    return Effect("speed_of_sound", shift, None, "1", shift is not None, why)
+    return Effect("speed_of_sound", shift, None, "1", included, why)
 
 
 def _clock_rate(clock: ClockRate) -> Effect:

@@ -12,9 +12,10 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from uncertainties import wrap
+
 from pipeline.bench.disc import ADDED_MASS_SHAPE
 from pipeline.bench.spring import oscillating_mass_kg
-from pipeline.results.budget import function_of
 
 
 class ResultFormula:
@@ -187,7 +188,7 @@ FORMULAS: Mapping[str, ResultFormula] = {
         lambda own_mass_kg, spring_mass=None, unstated_spring_mass=0.0: (
             own_mass_kg + unstated_spring_mass / 3.0
             if spring_mass is None
-            else function_of(oscillating_mass_kg, spring_mass, own_mass_kg)
+            else wrap(oscillating_mass_kg)(spring_mass, own_mass_kg)
         )
     ),
     "half_stiffness": ResultFormula(

@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.levels import FEWEST_FOR_CURVE, FEWEST_FOR_MEDIAN, NEGLIGIBLE, SIGNIFICANT, normal_quantile
+from pipeline.numerics.levels import (
+    FEWEST_FOR_CURVE,
+    FEWEST_FOR_MEDIAN,
+    LARGEST,
+    NEGLIGIBLE,
+    SIGNIFICANT,
+    normal_quantile,
+)
 from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8, U8, UNUSABLE, Quality, Track
 
@@ -29,10 +36,11 @@ U_OF_DIFFERENCES = 1.63
 CREST_SIGMAS = 3.5
 # Samples over which a local curvature is estimated; the probability on either side of its quantile is known to 3 %.
 CURVATURE_BLOCK = 256
-LARGEST_VALUE = 1e100  # magnitude of a measured value; anything beyond is a missing sample
-ONE_VALUE = 1e-9  # fraction of the largest value; smaller differences are rounding errors of one value
+# Fraction of the largest value below which differences are rounding errors of one value. It is chosen between those of
+# numbers in double and in single precision, 1e-16 and 6e-8.
+ONE_VALUE = 1e-9
 # Distance of a false echo from the median of the five samples around it, beyond what curvature explains, in standard
-# deviations of the noise.
+# deviations of the noise: a normal deviate lies beyond it with a probability of 1e-15.
 SPIKE_SIGMAS = 8.0
 # Least ratio of the number of samples in a plateau to that in the band of equal width beneath it. For an unclipped
 # crest the ratio is 1 / (sqrt 2 - 1) = 2.4; it is below 3.8 in 90 % of the recordings of `python -m tests.golden`.
@@ -119,7 +127,7 @@ def condition(track: Track) -> Samples:
     (2, 1)
     """
     flags = track.flags.copy()
-    measured = np.abs(track.y) < LARGEST_VALUE  # and not NaN
+    measured = np.abs(track.y) < LARGEST  # and not NaN
     flags[~measured] |= np.uint8(Quality.MISSING)
     # Where the reader has flagged one of two interchanged rows, its decision is kept.
     judged = (flags & np.uint8(Quality.DUPLICATE_TIME | Quality.NON_MONOTONIC_TIME)) != 0

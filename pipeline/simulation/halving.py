@@ -68,7 +68,6 @@ def auto(
     DynamicsError
         If the tolerance is below the limit of double precision, or the method does not reach it.
     """
-    demand_tolerance(problem, spacing_s, count, tolerance)
     method = EXACT if problem.equation.is_linear else STRANG
     return replace(halved(problem, method, spacing_s, count, tolerance, timer), chosen=True)
 
@@ -84,15 +83,18 @@ def halved(
     """Solve a motion by one method and halve its step until the stated error is within a tolerance.
 
     With an error of :math:`c h^p` the difference of two runs is :math:`2^p - 1` times the error of the finer run. The
-    rounding error of the phase is common to both runs and is therefore added.
+    rounding error of the phase is common to both runs and is therefore added; no tolerance is below twice its size.
     """
+    rounding = rounding_error(problem, spacing_s * count)
     demand_times(spacing_s, spacing_s * count)
+    if not 2.0 * rounding <= tolerance < math.inf:
+        reach = f"at least {2.0 * rounding:.1e}, what double precision can reach in {spacing_s * count:g} s"
+        raise DynamicsError(f"the tolerance must be finite and {reach}, got {tolerance:g}")
     refused = f"{integrator.name} cannot keep a tolerance of {tolerance:.3g} here"
     if why := integrator.refusal(problem):
         raise DynamicsError(f"{refused}: {why}", "take strang or auto")
     if why := integrator.no_estimate(problem):
         raise DynamicsError(f"{refused}: {why}")
-    rounding = rounding_error(problem, spacing_s * count)
     if integrator is EXACT:
         started, run = timer(), EXACT.run(problem, spacing_s, count)
         return Solution(EXACT, 1, problem, run, rounding, rounding, running_s=timer() - started)
@@ -140,16 +142,6 @@ def solved_once(
 def rounding_error(problem: Problem, seconds: float) -> float:
     """Return the error of the displacement by rounding of the phase :math:`\\omega t`, relative to the amplitude."""
     return float(np.finfo(np.float64).eps) * (4.0 + problem.equation.angular_frequency_per_s * seconds)
-
-
-def demand_tolerance(problem: Problem, spacing_s: float, count: int, tolerance: float) -> None:
-    """Refuse a tolerance that double precision cannot reach: below twice the rounding of the phase."""
-    seconds = spacing_s * count
-    demand_times(spacing_s, seconds)
-    least = 2.0 * rounding_error(problem, seconds)
-    if not least <= tolerance < math.inf:
-        reach = f"at least {least:.1e}, what double precision can reach in {seconds:g} s"
-        raise DynamicsError(f"the tolerance must be finite and {reach}, got {tolerance:g}")
 
 
 def _settings(

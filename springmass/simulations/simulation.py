@@ -20,7 +20,7 @@ from pipeline.quantities import QUANTITIES
 from pipeline.results.effects import Effect, simulated_effects
 from pipeline.simulation import Integrator, Problem, Trajectory, get_integrator
 from pipeline.simulation.band import STRONGEST, Band, propagated, spread, uncertain
-from pipeline.simulation.halving import Solution, auto, demand_tolerance, halved, rounding_error, solved_once
+from pipeline.simulation.halving import Solution, auto, halved, rounding_error, solved_once
 from pipeline.simulation.methods import DOP853
 from pipeline.track import F8
 from springmass.errors import LOG, ProgramError
@@ -148,8 +148,6 @@ def solve(
     integrator = get_integrator(method) if isinstance(method, str) else method
     if tolerance is None and integrator.order:
         return solved_once(problem, integrator, spacing_s, count, time.perf_counter)
-    if tolerance is not None:
-        demand_tolerance(problem, spacing_s, count, tolerance)
     return halved(problem, integrator, spacing_s, count, wanted, time.perf_counter)
 
 

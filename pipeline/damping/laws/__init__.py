@@ -16,25 +16,11 @@ from failure.extensions import load_named
 from pipeline.bench.law_names import GROUP, law_names
 from pipeline.damping.laws.drag import DRAGS, Drag
 from pipeline.damping.laws.law import Law, free_power, in_units, units_of, words_of
-from pipeline.damping.laws.of_function import FunctionLaw, make_law
+from pipeline.damping.laws.of_function import FunctionLaw
 from pipeline.damping.laws.power import Power
 from pipeline.errors import AnalysisError
-from pipeline.units import Unit
 
-__all__ = [
-    "LAWS",
-    "Drag",
-    "FunctionLaw",
-    "Law",
-    "Power",
-    "Unit",
-    "find_law",
-    "free_power",
-    "in_units",
-    "make_law",
-    "units_of",
-    "words_of",
-]
+__all__ = ["LAWS", "Drag", "FunctionLaw", "Law", "find_law", "free_power", "in_units", "units_of", "words_of"]
 
 _ALL: tuple[Law, ...] = (*DRAGS, Power())
 LAWS: Mapping[str, Law] = MappingProxyType({law.name: law for law in _ALL})

@@ -21,9 +21,8 @@ from pipeline.quantities import QUANTITIES
 from pipeline.track import F8
 from pipeline.units import Unit
 
-STEP_S = (
-    1e-3  # of the difference for the rate, s; the error by Taylor's theorem is that of Press et al. (2007), section 5.7
-)
+# Step of the difference for the rate, s; the error by Taylor's theorem is that of Press et al. (2007), section 5.7.
+STEP_S = 1e-3
 
 
 def make_law(

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 
 from pipeline.damping.laws.drag import Drag
+from pipeline.numerics.least_squares import central_differences
 from pipeline.track import F8
 from pipeline.units import Unit
 
@@ -28,21 +28,15 @@ class Power:
     cases: tuple[str, ...] = ("none", "linear", "quadratic", "friction")
 
     def curve(self, t: F8, theta: F8) -> tuple[F8, F8]:
-        """Return the closed form; 0 after the motion has stopped, infinite beyond a pole of a growing one."""
-        at = np.asarray(t, np.float64)
-        start, c, n = theta.tolist()
-        found = _solution(at, theta)
-        amplitude, x = found.amplitude, found.x
-        jacobian = np.empty((at.size, 3))
-        with np.errstate(all="ignore"):
-            # d ln A / dx = -1/(1 - m x); x depends on A0, c and n through c t A0^(n-1).
-            fall = -amplitude / found.rest
-            jacobian[:, 0] = (amplitude - (1.0 - n) * fall * x) / start
-            jacobian[:, 1] = fall * at * np.float64(start) ** (n - 1.0)
-            jacobian[:, 2] = (fall * np.log(np.float64(start)) + amplitude * x * _logarithm_slope(found)) * x
-        if found.rest.min() <= 0.0:
-            jacobian[found.rest <= 0.0] = 0.0 if n < 1.0 and c > 0 else np.inf
-        return amplitude, jacobian
+        """Return the closed form; 0 after the motion has stopped, infinite beyond a pole of a growing one.
+
+        The derivatives are central differences.
+        """
+        amplitude = _amplitude(t, theta)
+        with np.errstate(invalid="ignore"):  # infinities differ beyond a pole
+            slopes = central_differences(lambda at: _amplitude(t, at), theta)
+        slopes[amplitude == 0.0] = 0.0
+        return amplitude, slopes
 
     def rate(self, amplitude: F8, theta: F8) -> F8:
         """Return -c A^n, or 0 if the amplitude is not positive."""
@@ -61,43 +55,13 @@ class Power:
         return np.array([start, rate * level ** (1.0 - n), n])
 
 
-class _Solution(NamedTuple):
-    """The parts of the closed form: A, x = k t, z = m x, 1 - z (zero at the stop or at a pole) and ln(1 - z)."""
-
-    amplitude: F8
-    x: F8
-    z: F8
-    rest: F8
-    logarithm: F8
-
-
-def _solution(t: F8, theta: F8) -> _Solution:
+def _amplitude(t: F8, theta: F8) -> F8:
     start, c, n = theta.tolist()
     with np.errstate(all="ignore"):
         # NaN where A0 is not positive: a fit may pass through such values.
         x = (c * np.float64(start) ** (n - 1.0)) * t if start > 0.0 else np.full(t.size, np.nan)
         z = (1.0 - n) * x
-        rest = 1.0 - z
-        # NaN beyond the stop or the pole, which is replaced below.
-        logarithm = np.log1p(-z)
-        exponent = logarithm / (1.0 - n) if abs(1.0 - n) > 1e-300 else -x
-        near = np.abs(z) < 1e-8
-        if near.any():
-            exponent = np.where(near, -x * (1.0 + 0.5 * z), exponent)
-        amplitude = start * np.exp(exponent)
-    over = rest <= 0.0
-    if over.any():
-        amplitude[over] = 0.0 if n < 1.0 and c > 0 else np.inf
-    return _Solution(amplitude, x, z, rest, logarithm)
-
-
-def _logarithm_slope(found: _Solution) -> F8:
-    """Return the derivative of -ln(1 - z)/z by z, by a series where the closed form would cancel."""
-    z = found.z
-    with np.errstate(all="ignore"):
-        closed = (found.logarithm + z / found.rest) / (z * z)
-    small = np.abs(z) < 1e-2
-    if small.any():
-        part = z[small]
-        closed[small] = 0.5 + part * (2 / 3 + part * (3 / 4 + part * (4 / 5 + part * (5 / 6 + part * (6 / 7)))))
-    return closed
+        exponent = np.log1p(-z) / (1.0 - n) if abs(1.0 - n) > 1e-300 else -x
+        amplitude = start * np.exp(np.where(np.abs(z) < 1e-8, -x * (1.0 + 0.5 * z), exponent))
+    amplitude[z >= 1.0] = 0.0 if n < 1.0 and c > 0 else np.inf
+    return np.asarray(amplitude)

@@ -132,12 +132,6 @@ def test_two_writers_of_a_file_come_one_after_the_other(tmp_path: Path) -> None:
 NAMES = {"page", "table", "old", "figures/a"}
 
 
-def fill(folder: Path, content: str) -> None:
-    """Make one result of two files."""
-    (folder / "table").write_text(content)
-    (folder / "page").write_text(content)
-
-
 def held(folder: Path) -> dict[str, str]:
     """Return what a folder holds, hidden things beside it among them."""
     every = [*folder.rglob("*"), *folder.parent.glob(".*")]
@@ -147,7 +141,8 @@ def held(folder: Path) -> dict[str, str]:
 def make(folder: Path, content: str) -> None:
     """Write a result whole."""
     with whole_folder(folder, NAMES, "page") as part:
-        fill(part, content)
+        (part / "table").write_text(content)
+        (part / "page").write_text(content)
 
 
 @pytest.mark.parametrize("inside", [False, True])
