@@ -43,6 +43,16 @@ def test_without_hard_links_a_rename_does(tmp_path: Path, monkeypatch: pytest.Mo
     assert len(list(tmp_path.iterdir())) == 2
 
 
+def test_a_pipe_or_device_is_not_replaced(tmp_path: Path) -> None:
+    """Root may rename over /dev/null, and every program then writes to a file on the disk."""
+    path = tmp_path / "pipe"
+    os.mkfifo(path)
+    with pytest.raises(WriteFailed, match="choose the name of a file"):
+        write_whole(path, "text")
+    assert path.is_fifo()
+    assert list(tmp_path.iterdir()) == [path]
+
+
 @pytest.mark.parametrize("error", [ValueError("in the middle"), KeyboardInterrupt()])
 def test_a_failing_body_leaves_the_old_state(tmp_path: Path, error: BaseException) -> None:
     """Whatever the body raises passes through, the temporary file goes and the old content stands."""
