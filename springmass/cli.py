@@ -76,7 +76,9 @@ def _call(words: Sequence[str]) -> int:
         errors.LOG.warning(f"unknown command {word!r}; {near}the commands are {', '.join(COMMANDS)}")
         return errors.USAGE
     except CycloptsError as error:
-        what = " ".join(str(error).split()).rstrip(".")
+        from springmass.commands.questions import refused_words
+
+        what = refused_words(error)
         called = " ".join(("springmass", *(error.command_chain or ())))
         errors.LOG.warning(f"{what}{' ' if what.endswith('?') else '; '}{called} --help shows what it takes")
         return errors.USAGE

@@ -50,6 +50,8 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = True) -> Itera
     target = Path(path)
     if not overwrite and os.path.lexists(target):
         raise already_exists(target)
+    if target.exists() and not (target.is_file() or target.is_dir()):  # a rename would replace even /dev/null
+        raise WriteFailed(target, "is a device or a pipe, and no file", "choose the name of a file")
     temporary = part_of(target)
     with writing(target):
         descriptor = lock_new(temporary, _open_file)

@@ -239,7 +239,7 @@ def _speed_of_sound(scene: Scene, track: Track) -> Effect:
     if track.u_scale > 0:
         why = "the distances were calibrated, so the calibration's uncertainty stands in its place"
     elif not track.sonic and not scene.tells_of_sensor:
-        why = "no rangefinder is known, so its 0.18 %/K stand in no uncertainty; [sensor] in the scene adds them"
+        why = "no rangefinder is known, so its 0.18 %/K stand in no uncertainty; a sensor in the scene adds them"
     elif scene.air_temperature_c is None:
         why = "the scene gives no air temperature, so a room's 20 +- 3 degC count, 0.5 % in the scale"
     else:

@@ -1,13 +1,15 @@
-"""Word the answer to a reader's question as options of the command line, quoted for a shell."""
+"""Word the answer to a reader's question, and what a command does not take, for the command line."""
 
 import re
 import shlex
 from collections.abc import Mapping, Sequence
 
+from cyclopts import CycloptsError, UnknownOptionError, UnusedCliTokensError
 from cyclopts.argument import Argument
 
 from acquisition.errors import NeedsAnswer
 from acquisition.recordings.questions import Question
+from springmass.loading.options import LOAD_FIELDS
 from springmass.terminal.printing import option_of
 
 
@@ -86,3 +88,16 @@ def for_course(question: Question) -> str:
     """Return how to answer a question about one recording of a course: in the table of runs, or for all recordings."""
     columns, options = ", ".join(question.missing), " ".join(map(quoted, pair_words(question.examples)))
     return f"fill in {columns} in the table of runs, or give batch {options} for all recordings"
+
+
+def refused_words(error: CycloptsError) -> str:
+    """Return what a command does not take; an option that says how a file is read may be a key of ``--read``."""
+    if isinstance(error, UnusedCliTokensError):
+        return f"expected no more arguments, got {' '.join(map(quoted, error.unused_tokens or ()))}"
+    if isinstance(error, UnknownOptionError):
+        option = error.token.keyword or error.token.value
+        taken = (argument.name for argument in error.argument_collection)
+        key = option.lstrip("-").replace("-", "_")
+        if "--read" in taken and key in LOAD_FIELDS:
+            return f"{option}: state it as --read {key}={LOAD_FIELDS[key].metadata['metavar']}"
+    return " ".join(str(error).split()).rstrip(".")

@@ -22,10 +22,10 @@ from springmass.report.recorded import bench_words, calibration_of, date_words, 
 from springmass.report.words import method, summary, verdict
 from springmass.result.advice import SEVERITY_WORDS, notices_of
 from springmass.result.budget_tables import budgets_of, correlations_of
-from springmass.result.grades import all_sound, grades_of, leaves_more_than_noise
+from springmass.result.grades import grades_of
 from springmass.result.law_rows import laws_across, laws_of
 from springmass.result.summary import symbol
-from springmass.result.table1 import rows_and_needs, table_rows
+from springmass.result.table1 import is_about, rows_and_needs, table_rows
 from springmass.runs.run import Run
 from springmass.typeset import MANY_FREEDOM, cells, count, page_unit, prefixed, pretty, pretty_number, typeset
 
@@ -184,7 +184,7 @@ def tables_of(runs: Sequence[Run]) -> Iterator[dict[str, Any]]:
         ]
         graded = grades_of(some[0].analysis) if len(runs) == 1 else {}
         shown = {row.name: graded[row.name] for row in rows if row.name in graded}
-        sound = all_sound(shown) and not leaves_more_than_noise(some[0].analysis)
+        sound = {graded.grade for graded in shown.values()} == {"sound"} and not is_about(some[0].analysis, "residuals")
         names = [run.name for run in some]
         yield {"names": names, "rows": rows, "grades": {} if sound else shown, "all_sound": sound}
 

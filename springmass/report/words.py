@@ -12,7 +12,7 @@ from pipeline.units import noun
 from springmass.comparing.comparison import SpringComparison, comparison_words
 from springmass.result.advice import harm_of, sentence
 from springmass.result.budget_tables import budgets_of
-from springmass.result.grades import grades_of, grades_text, leaves_more_than_noise
+from springmass.result.grades import grades_of, grades_text
 from springmass.result.table1 import is_about
 from springmass.typeset import prefixed, pretty, pretty_number, typeset, unbroken
 
@@ -159,7 +159,7 @@ def _values(analysis: Analysis, motion: Oscillation) -> str:
 
 
 def _trust(analysis: Analysis, greatest: tuple[str, Contribution] | None) -> str:
-    noise = "more than noise" if leaves_more_than_noise(analysis) else "only noise"
+    noise = "more than noise" if is_about(analysis, "residuals") else "only noise"
     text = f"{grades_text(analysis, page=True)} The fit leaves {noise} in the residuals"
     if greatest is not None:
         symbol, it = greatest

@@ -7,7 +7,7 @@ that it doubts (``doubts`` in findings.toml), and a quantity those that it comes
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -15,7 +15,7 @@ from pipeline.analyse import Analysis
 from pipeline.findings.finding import Finding, kinds
 from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.quantities import INPUTS, MODEL_PARTS, QUANTITIES
-from springmass.result.table1 import is_about, numbers_of, table_rows
+from springmass.result.table1 import numbers_of, table_rows
 
 Grade = Literal["sound", "uncertain", "do not quote"]
 GRADES: tuple[Grade, ...] = get_args(Grade)
@@ -103,16 +103,6 @@ def _sized(analysis: Analysis, name: str, x: Estimate) -> Iterator[Reason]:
             yield Reason("do not quote", greatest, f"{share}{label}")
         else:
             yield Reason("uncertain", greatest, label)
-
-
-def leaves_more_than_noise(analysis: Analysis) -> bool:
-    """Return whether a finding says that the residuals are more than noise, or were not checked."""
-    return is_about(analysis, "residuals")
-
-
-def all_sound(graded: Mapping[str, Graded]) -> bool:
-    """Return whether there are values and all of them are sound."""
-    return bool(graded) and all(of_value.grade == "sound" for of_value in graded.values())
 
 
 def grades_text(analysis: Analysis, *, page: bool) -> str:

@@ -17,22 +17,18 @@ def laws_of(analysis: Analysis) -> dict[str, Any]:
     """Return the rows of all laws fitted to one run, and the reasons why other laws were not fitted."""
     damping = analysis.damping
     fitted = {law: analysis.derived.parameters_of(fit) for law, fit in damping.fits.items()}
-    return {**_laws(damping, fitted), "unfitted": [(law, typeset(why)) for law, why in damping.unfitted.items()]}
+    return {"rows": _rows(damping, fitted), "unfitted": [(law, typeset(why)) for law, why in damping.unfitted.items()]}
 
 
 def laws_across(joint: JointDamping) -> dict[str, Any]:
     """Return the rows of all laws fitted to several runs with shared coefficients, and the conclusion in words."""
     fitted = {law: fit.coefficients for law, fit in joint.fits.items()}
-    return {
-        "message": typeset(joint.message),
-        "unfitted": [],
-        **_laws(joint, fitted),
-    }
+    return {"message": typeset(joint.message), "rows": _rows(joint, fitted), "unfitted": []}
 
 
-def _laws(damping: Damping | JointDamping, fitted: Mapping[str, Mapping[str, Estimate]]) -> dict[str, Any]:
+def _rows(damping: Damping | JointDamping, fitted: Mapping[str, Mapping[str, Estimate]]) -> list[dict[str, Any]]:
     """Return one row per fitted law: goodness of fit, status and coefficients."""
-    rows = [
+    return [
         {
             "name": law,
             "status": law_status(damping, law),
@@ -44,7 +40,6 @@ def _laws(damping: Damping | JointDamping, fitted: Mapping[str, Mapping[str, Est
         }
         for law, fit in damping.fits.items()
     ]
-    return {"rows": rows}
 
 
 def _difference(value: float) -> str:

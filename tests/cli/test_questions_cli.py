@@ -58,18 +58,8 @@ def test_the_line_that_is_suggested_does_what_was_asked(cli: Cli, table: Path, t
 
 PAIRS = {
     "replay": ["replay", "FILE", "--speed", "max"],
-    "replay a channel that is not there": [
-        "replay",
-        "--read",
-        "channel=z",
-        "--read",
-        "unit=cm",
-        "FILE",
-        "--speed",
-        "max",
-    ],
+    "replay a wrong channel": ["replay", "--read", "channel=z", "--read", "unit=cm", "FILE", "--speed", "max"],
     "simulate": ["simulate", "--against", "FILE", "--scene", SCENE, "--json"],
-    "trade": ["trade", "FILE", "--seeds", "1", "--json"],
 }
 
 

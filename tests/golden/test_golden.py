@@ -24,7 +24,7 @@ def places(tmp_path_factory: pytest.TempPathFactory) -> Places:
     return Places(tmp_path_factory.mktemp("golden"))
 
 
-@pytest.mark.parametrize("command", list(FROZEN)[::25])
+@pytest.mark.parametrize("command", list(FROZEN)[::40])
 def test_a_command_line_gives_what_was_frozen(places: Places, command: str) -> None:
     """Numbers, codes, files and the exit code are those of the frozen outputs."""
     if missing(shlex.split(command)):

@@ -81,22 +81,8 @@ def test_numbers_are_those_of_the_command_line(client: tuple[WindowClient, Path]
         position, velocity = (str(next(folder.glob(f"*/*/{name}"))) for name in pair())
         typed = f"{mass}+/-{u} g".replace(",", ".")
         capsys.readouterr()
-        assert (
-            main(
-                [
-                    "analyse",
-                    position,
-                    "--velocity",
-                    velocity,
-                    "--json",
-                    "--mass-kg",
-                    typed,
-                    "--set",
-                    "disc.diameter_m=10.2 cm",
-                ]
-            )
-            == 0
-        )
+        words = ("--mass-kg", typed, "--set", "disc.diameter_m=10.2 cm")
+        assert main(["analyse", position, "--velocity", velocity, "--json", *words]) == 0
         assert shown == json.loads(capsys.readouterr().out)["estimates"]
     window.do("remove", card=card["id"])
 

@@ -11,7 +11,6 @@ import pytest
 
 from pipeline.analyse import Analysis, analyse
 from pipeline.bench.scene import Scene
-from pipeline.findings.finding import Finding
 from pipeline.track import Track
 
 RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "recordings"
@@ -41,12 +40,6 @@ def analysed(name: str) -> Analysis:
     return analyse(track_of(name))
 
 
-def mode_of(result: Analysis) -> Finding:
-    """Return the finding on the mode beside the main oscillation."""
-    (found,) = (finding for finding in result.findings if finding.code == "sideways_mode")
-    return found
-
-
 @pytest.mark.parametrize("name", [BARE, DISC, *OTHERS])
 def test_halves_of_a_run_agree_with_the_whole(name: str) -> None:
     """The period of either half lies within five uncertainties of the whole run's, real life included."""
@@ -61,7 +54,8 @@ def test_halves_of_a_run_agree_with_the_whole(name: str) -> None:
 @pytest.mark.parametrize("name", [BARE, DISC, *OTHERS])
 def test_every_bob_swings_sideways(name: str) -> None:
     """Each run holds a second mode at 0.58 to 0.61 of the main frequency: a pendulum of 0.33 to 0.4 m, the bench's."""
-    mode, main = mode_of(analysed(name)), analysed(name).estimates["frequency"].value
+    (mode,) = (finding for finding in analysed(name).findings if finding.code == "sideways_mode")
+    main = analysed(name).estimates["frequency"].value
     assert [effect.included for effect in analysed(name).effects if effect.name == "sideways_mode"] == [True]
     frequency = mode.values["frequency_hz"]
     assert 0.58 < frequency / main < 0.61

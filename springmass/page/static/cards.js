@@ -49,8 +49,6 @@ function draw_chart(figure, chart) {
   return new Chart(box, decoded(structuredClone(chart)));
 }
 
-// What may be stated about any file; a question of its reader has the choices of the file.
-const READING = () => [["channel", "Column of values", []], ["unit", "Unit", KNOWN.units], ["time", "Column of times", []], ["time_unit", "Unit of the times", KNOWN.times], ["rate_hz", "Rate in samples per second", []]].map(([name, label, of]) => ({ name, label, choices: of }));
 const STAGES = { waiting: "Waiting ...", reading: "Reading ...", analysing: "Analysing ...", done: "", question: "Needs an answer", failed: "Not read" };
 
 class RecordingCard {
@@ -127,10 +125,10 @@ class RecordingCard {
     this.draw(this.at(".outline"), { ...opened.outline, caption: "" });
   }
 
-  // What a file leaves open is asked in the open; whatever else may be stated about it waits in a fold.
+  // What a file leaves open is asked in the open, with its own choices; whatever else may be stated waits in a fold.
   show_question({ stage, question, asked, answers, opened, form: bench }) {
     const form = this.at(".question"), fold = this.at(".assumed"), open = stage === "question" ? question : null;
-    const ours = opened && !opened.foreign, fields = new Map(READING().map((field) => [field.name, field]));
+    const ours = opened && !opened.foreign, fields = new Map(KNOWN.reading.map((field) => [field.name, field]));
     for (const field of asked || []) fields.set(field.name, field);
     const now = new Set(open ? open.fields.map(({ name }) => name) : []);
     form.hidden = !open;

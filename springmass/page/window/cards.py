@@ -17,6 +17,7 @@ from typing import Annotated, Any
 import msgspec
 from platformdirs import user_state_path
 
+from acquisition.recordings.questions import Missing
 from acquisition.units import MEASURES, TIMES
 from pipeline.damping.laws import LAWS, words_of
 from springmass.errors import ProgramError
@@ -29,6 +30,15 @@ MOST_OF_FILE, MOST_TOGETHER, MOST_FILES = 200_000_000, 1_000_000_000, 200
 KEPT_S = 24 * 3600.0
 ALIVE_S = 60.0
 """A window whose folder was not touched for so long has ended; it touches it every second."""
+LABELS = {
+    Missing.CHANNEL: "Column of values",
+    Missing.UNIT: "Unit",
+    Missing.TIME: "Column of times",
+    Missing.TIME_UNIT: "Unit of the times",
+    Missing.RATE_HZ: "Rate in samples per second",
+    Missing.RUN: "Run",
+}
+"""What may be stated about how a file is read; all but the run may be stated about any file."""
 SETTLED = ("done", "question", "failed")
 """Stages of a card that wait for a person."""
 _UNSET = dict.fromkeys(("velocity", "scene", "from_s", "to_s", "law", "accuracy"))
@@ -404,7 +414,9 @@ class Cards:
     def since(self, revision: int) -> list[dict[str, Any]]:
         """Return the messages for a page that has seen everything up to a revision."""
         laws = [{"value": name, "label": words_of(law)} for name, law in LAWS.items()]
-        known = {"laws": laws, "units": [*MEASURES], "times": [*TIMES]}
+        choices = {Missing.UNIT: [*MEASURES], Missing.TIME_UNIT: [*TIMES]}
+        reading = [{"name": x.value, "label": label, "choices": choices.get(x, [])} for x, label in LABELS.items()]
+        known = {"laws": laws, "reading": reading[:-1]}
         order = {"type": "cards", "order": [*self.cards], "earlier": self.earlier, **known}
         return [order, self._recorder, *(card.message() for card in self.cards.values() if card.revision > revision)]
 

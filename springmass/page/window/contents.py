@@ -13,6 +13,7 @@ from springmass.charts.run import charts_of, recording
 from springmass.comparing.comparison import SpringComparison
 from springmass.comparing.reported import Reported
 from springmass.loading.loaded import Loaded
+from springmass.page.window.cards import LABELS
 from springmass.report.html import SYMBOL_WITH_INDEX, tables_of
 from springmass.report.recorded import date_words, notes_of
 from springmass.report.words import summary, verdict
@@ -20,14 +21,6 @@ from springmass.result.advice import notices_of, sentence
 from springmass.runs.run import Run
 from springmass.typeset import cells, pretty, typeset
 
-LABELS = {
-    Missing.RUN: "Run",
-    Missing.CHANNEL: "Column of values",
-    Missing.TIME: "Column of times",
-    Missing.RATE_HZ: "Rate in samples per second",
-    Missing.TIME_UNIT: "Unit of the times",
-    Missing.UNIT: "Unit",
-}
 OWN_FORMATS = {"run": "run file of springmass", "wire": "log of a recording"}
 
 

@@ -131,13 +131,13 @@ class Children:
                 spare, self._spare = self._spare, None  # before the wait: the next card needs a process of its own
                 child = await (spare or Child.start())
             self._children[holder] = child
-            self.prepare()
             try:
                 async for answer in child.ask(request, LONGEST_S + LONGEST_S_PER_MB * size * 1e-6):
                     yield answer
             except BaseException:
                 self.forget(holder)
                 raise
+        self.prepare()
         for idle in [each for each in self._children if not self._turns[each].locked()][:-IDLE]:
             self.forget(idle)
 

@@ -43,6 +43,16 @@ def test_without_hard_links_a_rename_does(tmp_path: Path, monkeypatch: pytest.Mo
     assert len(list(tmp_path.iterdir())) == 2
 
 
+def test_a_pipe_or_device_is_not_replaced(tmp_path: Path) -> None:
+    """Root may rename over /dev/null, and every program then writes to a file on the disk."""
+    path = tmp_path / "pipe"
+    os.mkfifo(path)
+    with pytest.raises(WriteFailed, match="choose the name of a file"):
+        write_whole(path, "text")
+    assert path.is_fifo()
+    assert list(tmp_path.iterdir()) == [path]
+
+
 @pytest.mark.parametrize("error", [ValueError("in the middle"), KeyboardInterrupt()])
 def test_a_failing_body_leaves_the_old_state(tmp_path: Path, error: BaseException) -> None:
     """Whatever the body raises passes through, the temporary file goes and the old content stands."""
@@ -132,12 +142,6 @@ def test_two_writers_of_a_file_come_one_after_the_other(tmp_path: Path) -> None:
 NAMES = {"page", "table", "old", "figures/a"}
 
 
-def fill(folder: Path, content: str) -> None:
-    """Make one result of two files."""
-    (folder / "table").write_text(content)
-    (folder / "page").write_text(content)
-
-
 def held(folder: Path) -> dict[str, str]:
     """Return what a folder holds, hidden things beside it among them."""
     every = [*folder.rglob("*"), *folder.parent.glob(".*")]
@@ -147,7 +151,8 @@ def held(folder: Path) -> dict[str, str]:
 def make(folder: Path, content: str) -> None:
     """Write a result whole."""
     with whole_folder(folder, NAMES, "page") as part:
-        fill(part, content)
+        (part / "table").write_text(content)
+        (part / "page").write_text(content)
 
 
 @pytest.mark.parametrize("inside", [False, True])

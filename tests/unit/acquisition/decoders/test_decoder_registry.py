@@ -22,15 +22,10 @@ LOOK_ALIKE = {name: names for names in (THREE_DIGITS, FOUR_DIGITS) for name in n
 every_family = pytest.mark.parametrize("family", families(), ids=lambda family: family.name)
 
 
-def stream(family: Sensor, n: int = 20) -> bytes:
-    """Return frames of a bob that swings."""
-    return b"".join(frames(family.name, [0.7 + 0.2 * math.sin(0.3 * i) for i in range(n)]))
-
-
 @every_family
 def test_the_bytes_of_a_family_are_recognised(family: Sensor) -> None:
     """Its own name, those that differ in the unit alone, and no other; also from the middle of a frame."""
-    data = stream(family)
+    data = b"".join(frames(family.name, [0.7 + 0.2 * math.sin(0.3 * i) for i in range(20)]))  # a bob that swings
     for start in (0, 1) if family.self_framing else (0,):
         assert set(probe(data[start:])) == LOOK_ALIKE.get(family.name, {family.name})
     assert f"[{family.name}]" in describe_bytes(data).looks

@@ -32,13 +32,6 @@ def codes(recording: Recording) -> set[str]:
     return {trap.code for trap in recording.traps}
 
 
-def check_position(recording: Recording, count: int = 12) -> None:
-    """Demand the rows of :func:`position_rows`, all sound."""
-    np.testing.assert_allclose(recording.samples.distance, (20 + np.arange(count) / 8) / 100, rtol=1e-15)
-    assert not recording.samples.flags.any()
-    assert recording.malformed_rows == 0
-
-
 @pytest.mark.parametrize("newline", sampled(["\r\n", "\n", "\r"], 1))
 @pytest.mark.parametrize(
     "header",
@@ -55,7 +48,9 @@ def check_position(recording: Recording, count: int = 12) -> None:
 def test_header_variants(header: list[str], newline: str) -> None:
     """Title, column line, both or neither: the rows are read alike."""
     recording = read(*header, *position_rows(), newline=newline)
-    check_position(recording)
+    np.testing.assert_allclose(recording.samples.distance, (20 + np.arange(12) / 8) / 100, rtol=1e-15)
+    assert not recording.samples.flags.any()
+    assert recording.malformed_rows == 0
     assert recording.info.rate_hz == 100.0
     assert recording.info.stated_error_m == 0.00239
     assert codes(recording) - {"unit_assumed"} == {"nominal_clock", "stated_error_is_not_noise"}
