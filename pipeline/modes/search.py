@@ -14,7 +14,6 @@ from pipeline.modes.spectrum import (
     Peak,
     SearchBand,
     evidence_for,
-    smooth_density,
     spectral_density,
     strongest,
     worth_a_look,
@@ -143,12 +142,8 @@ class _Search:
             both = np.concatenate([taken, self.columns_of(trial)], axis=1)
             _, _, fitted = self.fit(both)
             fall, left = float(fitted @ fitted), self.blocks.unweighted(self.left - fitted)
-            evidence, f = 0.5 * (fall - fallen) / self.blocks.samples, trial.frequency_hz
-            smooth = smooth_density(left, f * self.blocks.step)
-            if evidence <= least * smooth:
-                continue  # the density is at least the smooth one
-            density = spectral_density(self.blocks, left, f, self.band, smooth)
-            if evidence > least * density:
+            density = spectral_density(self.blocks, left, trial.frequency_hz, self.band)
+            if 0.5 * (fall - fallen) / self.blocks.samples > least * density:
                 self.found.append(trial)
                 taken, fallen = both, fall
         if taken.size:

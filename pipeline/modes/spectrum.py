@@ -167,7 +167,7 @@ def strongest(blocks: Blocks, left: F8, basis: F8, band: SearchBand) -> Peak | N
     if np.linalg.norm(line[:, :2], -2) < 0.2:  # smallest singular value: the model already contains the line
         return None
     noise = blocks.unweighted(left - line @ np.linalg.lstsq(line, left, rcond=None)[0])
-    density = spectral_density(blocks, noise, f, band, smooth_density(noise, f * blocks.step))
+    density = spectral_density(blocks, noise, f, band)
     # Rows are weighted by their numbers of samples; the density is that of one full block.
     own = line[:, :2] @ np.linalg.lstsq(line[:, :2], left, rcond=None)[0]
     evidence = 0.5 * float(own @ own) / (density * blocks.samples)
@@ -196,19 +196,15 @@ def evidence_for(chance: float, trials: float) -> float:
     return float(FREEDOM * math.expm1(-math.log(single) / FREEDOM))
 
 
-def spectral_density(blocks: Blocks, y: F8, frequency_hz: float, band: SearchBand, smooth: float) -> float:
-    """Return the noise variance of one block at a frequency, m^2: the larger of the smooth and the local one."""
+def spectral_density(blocks: Blocks, y: F8, frequency_hz: float, band: SearchBand) -> float:
+    """Return the noise variance of one block at a frequency, m^2: the larger of the autoregression's and the local."""
+    smooth = float(_density(*_autoregression(y, AR_ORDER), np.asarray(frequency_hz * blocks.step)))
     frequency, power = spectrum(blocks, y)
     reach = FARTHEST / blocks.seconds
     around = slice(*np.searchsorted(frequency, [frequency_hz - reach, frequency_hz + reach]))
     near = band.inside(frequency[around]) & (np.abs(frequency[around] - frequency_hz) * blocks.seconds >= NEAREST)
     local = float(np.mean(power[around][near])) if np.count_nonzero(near) >= 4 * OVERSAMPLING else 0.0
     return max(smooth, local, 1e-300)
-
-
-def smooth_density(y: F8, turns: float) -> float:
-    """Return the spectral density, at a frequency in cycles per step, of an autoregression fitted to y (n,)."""
-    return float(_density(*_autoregression(y, AR_ORDER), np.asarray(turns)))
 
 
 def _autoregression(y: F8, highest: int) -> tuple[F8, float]:

@@ -23,14 +23,7 @@ from pipeline.motion.fitted import Method, Oscillation, Phase, RestPosition, Wav
 from pipeline.motion.frequency import TABLE_POINTS, Phases, TimeTable, amplitude_table, find_bend, turns
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_CURVE, VERY_STRONG
-from pipeline.numerics.regression import (
-    Line,
-    Scatter,
-    chi2_quantile,
-    correlation_length,
-    scatter,
-    smooth_curve,
-)
+from pipeline.numerics.regression import Line, Scatter, chi2_quantile, correlation_length, scatter, smooth_curve
 from pipeline.track import F8
 from pipeline.windows.demodulate import ROUNDING, Windows
 
@@ -85,12 +78,9 @@ class Averaged:
 
 def fit_windows(windows: Windows, modes: Modes, damping: Damping) -> Oscillation:
     """Fit phase and rest position to the windows, whose amplitudes gave the laws."""
-    samples = modes.samples
-    track = samples.track
-    last = float(np.max(track.t, where=windows.used, initial=-np.inf))
-    phase = fit_phase(windows, damping, last)
-    rest = fit_rest(windows, track.unit)
-    return assembled(windows, modes, damping, phase, rest, "windows")
+    track = modes.samples.track
+    phase = fit_phase(windows, damping, float(np.max(track.t[windows.used])))
+    return assembled(windows, modes, damping, phase, fit_rest(windows, track.unit), "windows")
 
 
 def assembled(
@@ -100,26 +90,15 @@ def assembled(
     track = modes.samples.track
     used = windows.used
     # A law is valid only where it was fitted: before the first and after the last sample used it is held constant.
-    last = float(np.max(track.t, where=used, initial=-np.inf))
-    best = damping.best
+    last, best = float(np.max(track.t[used])), damping.best
     amplitude = best.amplitude(np.clip(track.t, damping.t0, last) - damping.t0)
     angle = phase.total(track.t)
     position = rest.at(track.t) + amplitude * np.cos(angle)
     residual = track.y - position
-    left = residual if used.all() else residual[used]
-
-    rms = math.sqrt(float(left @ left) / left.size)
+    rms = math.sqrt(float(np.mean(residual[used] ** 2)))
     whole = position if modes.subtracted is None else position + modes.subtracted
     waveform = Waveform(whole, partial(_velocity, best, phase, amplitude, track.t, angle), residual, rms)
-    return Oscillation(
-        windows=windows,
-        modes=modes,
-        damping=damping,
-        phase=phase,
-        rest=rest,
-        waveform=waveform,
-        method=method,
-    )
+    return Oscillation(windows, modes, damping, phase, rest, waveform, method)
 
 
 def _velocity(best: LawFit, phase: Phase, amplitude: F8, t: F8, angle: F8) -> F8:

@@ -241,17 +241,9 @@ def _rows(samples: Samples, windows: Windows, damping: Damping) -> Rows:
     last, first = float(np.max(track.t[used])), damping.t0
     t = np.clip(np.where(np.isfinite(track.t), track.t, first), first, last) - first
     expected = max(samples.noise_of_reading, 1e-9 * abs(float(damping.best.joint.values[0])))
+    plateau = partial(samples.near_plateau, noise=expected)
     # False echoes of the windows that the solution explains return later.
-    used_first = within & windows.used
-    return Rows(
-        t=t,
-        y=track.y,
-        candidates=within,
-        used=used_first,
-        u=expected,
-        columns=None,
-        near_plateau=partial(samples.near_plateau, noise=expected),
-    )
+    return Rows(t, track.y, candidates=within, used=within & windows.used, u=expected, near_plateau=plateau)
 
 
 def _nearest(model: Solved, rows: Rows, starts: Iterator[F8]) -> F8:

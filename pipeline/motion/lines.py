@@ -38,8 +38,6 @@ MAINS_HZ, MAINS_SHARE = (50.0, 60.0, 100.0, 120.0), 0.01
 # Distance in bins, the reciprocals of the length of the record, within which a decay or a change of the frequency has
 # sidebands, as measured on the wide pendulum and the lost rows of `python -m tests.trials.grades kinds`.
 SIDEBANDS = 3.0
-# Minimum number of beats in the record; with fewer, two modes cannot be distinguished from one that changes:
-BEATS = 0.8  # those of tests/properties/test_no_oscillation.py at a ratio of 1.02 beat less than once
 MODE_PARAMETERS = ("rest", *(f"{m}_{n}" for m in ("first", "second") for n in ("cosine", "sine", "omega", "decay")))
 
 Cause = Literal["drive", "mains", "overtone"]
@@ -253,9 +251,8 @@ def find_two_modes(samples: Samples) -> TwoModes | Refusal:
         return Refusal("no_two_modes")
     strong, weak = np.argsort(-lines.sizes).tolist()
     omegas, sizes = lines.omegas, lines.sizes
-    beats = abs(omegas[0] - omegas[1]) * record.seconds / (2.0 * math.pi)
     slow, fast = float(np.min(omegas)), float(np.max(omegas))
-    few = slow * record.seconds < 2.0 * math.pi * FEWEST_FOR_MEDIAN or beats < BEATS
+    few = slow * record.seconds < 2.0 * math.pi * FEWEST_FOR_MEDIAN
     if few or sizes[weak] < WEAKER * sizes[strong]:
         return Refusal("no_two_modes")
     # A component at a multiple of the slower frequency is not a second mode but a harmonic, as of a square wave.

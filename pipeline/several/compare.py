@@ -13,15 +13,16 @@ from pipeline.bench.spring import HEAVIEST_SHARE, oscillating_mass_kg, unstated_
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import central_differences, minimise
-from pipeline.numerics.levels import FALSE_ALARM
+from pipeline.numerics.levels import FALSE_ALARM, NEGLIGIBLE
 from pipeline.numerics.regression import chi2_quantile
 from pipeline.numerics.threads import one_thread
 from pipeline.results.derive import Derived
 from pipeline.track import F8
 
-NEARER = 0.01  # maximum tension with two runs exchanged, over that without: chance does not reduce it so much
-SOLVED = 0.5  # maximum uncertainty of the spring's mass, over its prior uncertainty, for which the runs determine it
-SUSPECTS = 8  # maximum number of runs that are exchanged pair by pair: those farthest from the mean
+# Maximum uncertainty of the spring's mass, over its prior uncertainty, for which the runs determine it: it is chosen,
+# and weighs the runs three times as much as the prior.
+SOLVED = 0.5
+SUSPECTS = 8  # maximum number of runs exchanged pair by pair, those farthest from the mean: it is chosen, for 28 fits
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +90,11 @@ class Comparison:
         """Whether all runs agree on one constant and a plausible mass of the spring."""
         return self.tension <= 1.0
 
+    @property
+    def nearer(self) -> float:
+        """The tension up to which an exchange explains this one: the runs agree, or deviate by a tenth as much."""
+        return max(NEGLIGIBLE**2 * self.tension, 1.0)
+
 
 @one_thread
 def compare_springs(
@@ -129,7 +135,7 @@ def compare_springs(
             trial = masses.copy()
             trial[i], trial[j] = trial[j], trial[i]
             other = _fit(runs, trial, spring_mass_kg, mass_correlation)
-            if other.tension <= max(NEARER * fit.tension, 1.0) and (not exchanged or other.tension < best.tension):
+            if other.tension <= fit.nearer and (not exchanged or other.tension < best.tension):
                 best, exchanged = other, (runs[i].name, runs[j].name)
     message = _message(fit, exchanged, best)
     return replace(fit, exchanged=exchanged, exchanged_chi2=best.chi2 if exchanged else None, message=message)

@@ -13,17 +13,14 @@ from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.levels import FEWEST_FOR_LINE, FEWEST_FOR_MEDIAN, NEGLIGIBLE, OUTLIER, coverage_factor
 from pipeline.numerics.robust import mad_sigma
-from pipeline.several.compare import NEARER, Comparison, SpringRun, compare_springs
+from pipeline.several.compare import Comparison, SpringRun, compare_springs
 
 # Maximum number of runs compared as those of one bench, which takes 0.3 s as measured if they disagree; of a larger
 # group only far runs are named.
 LARGEST_BENCH = 50
-# Relative spread of one bench's constants up to which no run is blamed: twice the quarter of a percent by which, as
-# measured below, its own runs differ.
+# Relative difference up to which no run is blamed and no exchange looked for: twice the quarter of a percent by which,
+# as measured, one bench's own runs differ.
 LITTLE = 0.005
-# Relative difference of a run from the others from which an exchange is looked for: bobs more alike than this cannot be
-# distinguished on springs that differ, as measured, by the quarter of a percent that one bench's own runs do.
-LEAST_EXCHANGE = 0.003
 EXCHANGES = ("recordings", "masses")
 
 
@@ -235,7 +232,7 @@ class _Displaced:
         """Return the tension after an exchange; infinite if this run then neither agrees nor comes far nearer."""
         others = self.others[:FEWEST_FOR_LINE]
         before, after = (_compared([replace(self.run, on_spring=x), *others]) for x in (self.spring, spring))
-        limit = 1.0 if before is None else max(NEARER * before.tension, 1.0)
+        limit = 1.0 if before is None else before.nearer
         return math.inf if after is None or after.tension > limit else after.tension
 
 
@@ -257,7 +254,7 @@ def _displaced(
                 continue
             middle, constant = float(np.median(values)), run.spring_constant.value
             off = abs(math.log(constant) - middle)
-            if off > LEAST_EXCHANGE:
+            if off > LITTLE:
                 near = max(NEGLIGIBLE * off, 0.0 if mates else OUTLIER * mad_sigma(values - middle))
                 displaced.append(
                     _Displaced(run, run.on_spring, constant, others, math.exp(middle), near, alone=not mates)
@@ -290,7 +287,7 @@ def _between_benches(runs: Sequence[_Displaced], found: Mapping[str, Suspect]) -
     for _, exchanged, one, two in sorted(sure, key=lambda each: each[0]):
         names = (one.run.name, two.run.name)
         if not solved & {*names}:
-            alike = abs(math.log(one.middle / two.middle)) < LEAST_EXCHANGE  # one spring, or two that might be one
+            alike = abs(math.log(one.middle / two.middle)) < LITTLE  # one spring, or two that might be one
             what = "masses (or the periods)" if alike else exchanged
             alone = one.alone and two.alone
             pairs |= _exchange(*names, what, "the others" if alone else "the other runs of their benches")

@@ -9,20 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.notice import Refusal
-from pipeline.numerics.levels import IMPROBABLE, MISFIT, NEGLIGIBLE
+from pipeline.numerics.levels import IMPROBABLE, MISFIT, NEGLIGIBLE, OUTLIER
 from pipeline.numerics.robust import mad_sigma, median
 from pipeline.samples.condition import GAP, Samples
 from pipeline.track import F8
+from pipeline.windows.sinusoids import LEAST_SAMPLES
 
 # Periods below which the line's negative-frequency image shifts the spectrum's peak: measured on sines of any phase, by
 # up to 8 % at two periods, 1 % at three and 0.05 % at four.
 FEW_PERIODS = 4.5
-# Minimum number of samples in a window; windows span as many whole periods as this needs. With a probability of 1 %,
-# nine degrees of freedom make the noise appear half as large as it is (chi-square).
-SAMPLES_PER_WINDOW = 12
-# Maximum standard uncertainty of a window's phase due to noise, rad; windows span as many whole periods as this needs.
-# The probability that two of them differ by half a turn is 1e-28.
-U_PHASE = 0.2
 # Highest frequency that is sought at uneven times, over their mean rate; a search up to it takes as long as an FFT of
 # sixteen times as many values. With 8, nothing changes, as measured by `python -m tests.golden --every 3`.
 BEYOND = 4.0
@@ -53,8 +48,9 @@ def find_cycles(samples: Samples) -> Cycles | Refusal:
     the search is repeated without the Hann window, which costs 1.8 dB. Below 4.5 periods the peak is off by up to a
     tenth. There the frequency is the one at which the residual of a sinusoid with an offset is smallest.
 
-    The phase of a window of N samples has the standard uncertainty :math:`\\sqrt{2/N}\\,\\sigma/A`. The window spans as
-    many periods as are needed to bring this down to 0.2 rad.
+    The amplitude of a window of N samples has the standard uncertainty :math:`u = \\sqrt{2/N}\\,\\sigma`, its phase
+    :math:`u/A`. The window spans as many periods as it needs for twice the fewest samples of a fit and for an amplitude
+    of five u, at which the phase is known to 0.2 rad.
 
     .. [1] M. Gasior, J. L. Gonzalez, "Improving FFT frequency measurement resolution by parabolic and Gaussian
        spectrum interpolation", AIP Conf. Proc. 732 (2004) 276, doi:10.1063/1.1831158.
@@ -81,7 +77,7 @@ def find_cycles(samples: Samples) -> Cycles | Refusal:
     count = duration_s * frequency_hz
     if count < 1.5:
         return Refusal("few_periods", {"periods": count})
-    needed = max(SAMPLES_PER_WINDOW, 2.0 * (samples.noise / (U_PHASE * max(amplitude, 1e-300))) ** 2)
+    needed = max(2 * LEAST_SAMPLES, 2.0 * (OUTLIER * samples.noise / max(amplitude, 1e-300)) ** 2)
     periods = max(1, math.ceil(needed * frequency_hz / track.rate_hz), math.ceil(count / MOST_WINDOWS))
     periods = min(periods, max(1, int(count)))
     return Cycles(frequency_hz, count, _bounds(track.t, used, frequency_hz, track.rate_hz, periods), periods)
@@ -209,9 +205,12 @@ def _bounds(t: F8, used: NDArray[np.bool_], frequency_hz: float, rate_hz: float,
     duration_s = float(t[last] - t[first]) + 1.0 / rate_hz
     windows = max(1, int(duration_s * frequency_hz / periods + 1e-6))
     edges = t[first] + duration_s * np.arange(windows + 1) / windows - 0.5 / rate_hz
+    return cut(t, edges, last + 1)
+
+
+def cut(recorded: F8, edges: F8, end: int) -> NDArray[np.int64]:
+    """Return the indices of the samples at which windows with these edges, s, begin, and that of their end."""
     # The latest time so far is monotone even where single times run backward.
-    latest = np.maximum.accumulate(np.where(np.isfinite(t), t, -np.inf))
-    bounds: NDArray[np.int64] = np.searchsorted(latest, edges).astype(np.int64)
-    bounds[-1] = last + 1
-    ahead = bounds[1:] > bounds[:-1]
-    return bounds if ahead.all() else bounds[np.concatenate([[True], ahead])]
+    latest = np.maximum.accumulate(np.where(np.isfinite(recorded), recorded, -np.inf))
+    bounds = np.append(np.searchsorted(latest, edges[:-1]), end).astype(np.int64)
+    return np.asarray(bounds[np.concatenate([[True], bounds[1:] > bounds[:-1]])])

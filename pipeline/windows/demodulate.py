@@ -29,7 +29,7 @@ from pipeline.numerics.regression import scatter, smooth_curve
 from pipeline.numerics.robust import mad_sigma, median
 from pipeline.samples.condition import Samples
 from pipeline.track import F8, U8, UNUSABLE, Quality
-from pipeline.windows.cycles import Cycles
+from pipeline.windows.cycles import Cycles, cut
 from pipeline.windows.sinusoids import Tuning, WindowFits, WindowSamples, quantile, refit, retune, solve, unwrap
 
 # Amplitude in standard uncertainties below which amplitude and phase are taken along a smooth phase. Its phase is then
@@ -171,10 +171,7 @@ def follow(windows: Windows, recorded: F8) -> Cycles:
     end = float(phase[-1]) + float(rate[-1]) * float(last - t[-1])
     count = int((end - begin) / (2.0 * math.pi * cycles.periods) + 1e-6)
     edges = np.interp(np.linspace(begin, end, count + 1), [begin, *phase, end], [first, *t, last])
-    latest = np.maximum.accumulate(np.where(np.isfinite(recorded), recorded, -np.inf))
-    bounds = np.searchsorted(latest, edges).astype(np.int64)
-    bounds[-1] = cycles.bounds[-1]
-    return replace(cycles, bounds=bounds[np.concatenate([[True], bounds[1:] > bounds[:-1]])])
+    return replace(cycles, bounds=cut(recorded, edges, int(cycles.bounds[-1])))
 
 
 def _ignore_clusters(windows: WindowSamples, basis: F8, noise: float) -> tuple[WindowFits, F8]:
