@@ -78,6 +78,8 @@ class Track:
         for name in ("u_scale", "u_offset_m", "u_rate", "clock_limit", "compared_s"):
             if (value := getattr(self, name)) is not None and not (math.isfinite(value) and value >= 0.0):
                 raise TrackError(f"{name} must be finite and not negative, got {value:g}", "leave it out")
+        if self.speed_of_sound_m_per_s is not None:  # only echoes have one
+            object.__setattr__(self, "sonic", True)
 
     def __len__(self) -> int:
         return int(self.t.size)

@@ -175,7 +175,7 @@ def _clock_comparison(samples: Block, info: SourceInfo, provenance: Mapping[str,
 def _scale(recorded_format: str, sensor: Mapping[str, Any]) -> dict[str, Any]:
     """Return how distances were calculated: the speed of sound, if it is known, and the calibration's uncertainties."""
     if recorded_format == MOTION_SENSOR:
-        return {"sonic": True, "speed_of_sound_m_per_s": SPEED_OF_SOUND_M_PER_S}
+        return {"speed_of_sound_m_per_s": SPEED_OF_SOUND_M_PER_S}
     if not sensor:
         return {}
     calibration = Calibration.from_mapping(sensor.get("calibration", {}))
