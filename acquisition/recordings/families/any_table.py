@@ -157,7 +157,10 @@ def _words(table: Header) -> list[int]:
 
 
 def without_monitor(text: Text) -> Text:
-    """Return a text in which the clock times that a serial monitor writes before each line are the first column."""
+    """Return a text in which the clock times that a serial monitor writes before each line are the first column.
+
+    They are left out where the lines begin with clock times of their own, each with another.
+    """
     if not _MONITOR.search(decode(text.data[: 1 << 16])):
         return text
     lines = decode(text.data)
@@ -167,7 +170,10 @@ def without_monitor(text: Text) -> Text:
     messages = [line for line in _MONITOR.sub("", lines[: 1 << 16]).split("\n") if line.strip()]
     marks = Counter(next((mark for mark in "\t;," if mark in line), " ") for line in messages)
     mark = marks.most_common(1)[0][0] if marks else " "
-    return Text.of(_MONITOR.sub(rf"\1{mark}", lines).encode())
+    first = (line.split(mark)[0].strip(' "') for line in messages)
+    own = [cell for cell in first if is_time_cell(cell)]
+    known = len(own) >= _SHARE * len(messages) and len({*own}) == len(own)
+    return Text.of(_MONITOR.sub("" if known else rf"\1{mark}", lines).encode())
 
 
 def prepared(text: Text) -> Text:
