@@ -39,14 +39,18 @@ CLEARLY_BETTER = 10.0
 """Difference of -2 log likelihood above which the better model is very strongly supported (Kass and Raftery 1995)."""
 IMPOSSIBLE, OFF_BY_ONE = 12.0, 2.3
 """Minus the log likelihood of a line too many, and of one that came with the read before or after its own, 1 in 10."""
-NOMINAL = math.log(MOST_LOST / (math.sqrt(2.0 * math.pi) * 1e-6 * 30.0 * math.sqrt(2.0)))
-"""Log of the odds for two crystals at their nominal rates against any other rate that lost lines may hide."""
 MOST_PLACES = 8
 """Maximum number of lost lines in one read whose places are weighed."""
-U_LOCKED_PPM = 30.0 * math.sqrt(2.0 / 3.0)
-"""Standard uncertainty of the rates of two crystals against each other, ppm: each is within 30 ppm at 25 degC."""
+CRYSTAL_PPM = 30.0
+"""Maximum rate error of a board's crystal at 25 degC, ppm."""
+U_LOCKED_PPM = CRYSTAL_PPM * math.sqrt(2.0 / 3.0)
+"""Standard uncertainty of the rates of two crystals against each other, ppm."""
+NOMINAL = math.log(MOST_LOST / (2e-6 * CRYSTAL_PPM))
+"""Log of the odds for two crystals at their nominal rates against any other rate that lost lines may hide.
 
-
+The density of the difference of two rectangles, 1/(2 x 30 ppm) at its centre, is compared with an even one over
+MOST_LOST.
+"""
 ADAPTER_PPM = 150.0
 """Maximum rate error of an adapter's clock against the host's, ppm: three times the 50 ppm of a crystal."""
 

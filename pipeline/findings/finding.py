@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, get_origin, get_type_hints
 
 from pipeline.notice import Notice, Severity
 from pipeline.units import amount, noun, number, plural
@@ -67,7 +67,7 @@ def kinds() -> Mapping[str, FindingKind]:
     import tomllib
 
     blocks = tomllib.loads(Path(__file__).with_name("findings.toml").read_text(encoding="utf-8"))
-    several = {name for name, kind in FindingKind.__annotations__.items() if kind.startswith("tuple")}
+    several = {name for name, kind in get_type_hints(FindingKind).items() if get_origin(kind) is tuple}
     for block in blocks.values():
         block |= {name: (x,) if isinstance(x := block[name], str) else tuple(x) for name in several & block.keys()}
     return {code: FindingKind(**block) for code, block in blocks.items()}

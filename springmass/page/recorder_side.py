@@ -16,7 +16,7 @@ import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from acquisition.events import Noted
 from springmass.session.failures import Failures
@@ -52,19 +52,25 @@ class PageProcess:
         self._phase = "waiting"
         self._over = False
         self.failed = False  # the process died; False if somebody closed the page
+        self._process: subprocess.Popen[bytes] | None = None
 
     def __enter__(self) -> PageProcess:
-        # In a separate session, because Ctrl-C is meant for the recording, which ends the page later.
-        self._process = subprocess.Popen(
-            self._command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            start_new_session=True,
-            env={**os.environ, OF_RECORDER: "1"},
+        try:
+            # In a separate session, because Ctrl-C is meant for the recording, which ends the page later.
+            pipe = subprocess.PIPE
+            environment = {**os.environ, OF_RECORDER: "1"}
+            self._process = subprocess.Popen(
+                self._command, stdin=pipe, stdout=pipe, start_new_session=True, env=environment
+            )
+        except OSError as error:
+            self._lost(error)
+            return self
+        self._listener = threading.Thread(
+            target=self._listen, args=(self._process,), name="springmass-page", daemon=True
         )
-        self._listener = threading.Thread(target=self._listen, name="springmass-page", daemon=True)
         self._listener.start()
-        threading.Thread(target=self._write, name="springmass-page-states", daemon=True).start()
+        writing = (self._process.stdin,)
+        threading.Thread(target=self._write, args=writing, name="springmass-page-states", daemon=True).start()
         return self
 
     def tell(self, phase: str, **facts: Any) -> None:
@@ -80,31 +86,32 @@ class PageProcess:
     def attend(self) -> None:
         """Wait until the page has ended because somebody closed it or nobody views it any more."""
         self._over = True
-        self._listener.join()
+        if self._process is not None:
+            self._listener.join()
 
     def __exit__(self, *_: object) -> None:
         """Wait until the page has ended, and kill it if it does not end in time."""
         self.ended()
-        self._listener.join(ENDS_WITHIN_S)
-        self._process.kill()
-        self._process.wait()
+        if self._process is not None:
+            self._listener.join(ENDS_WITHIN_S)
+            self._process.kill()
+            self._process.wait()
 
-    def _write(self) -> None:
-        assert self._process.stdin is not None
-        with contextlib.suppress(OSError), self._process.stdin as page:  # an error means that the page has ended
+    def _write(self, page: IO[bytes]) -> None:
+        with contextlib.suppress(OSError), page:  # an error means that the page has ended
             while (line := self._lines.get()) is not None:
                 page.write(json.dumps(line).encode() + b"\n")
                 page.flush()
 
-    def _listen(self) -> None:
-        assert self._process.stdout is not None
-        with self._process.stdout as lines:
+    def _listen(self, process: subprocess.Popen[bytes]) -> None:
+        assert process.stdout is not None
+        with process.stdout as lines:
             for line in lines:
                 try:
                     self._take(json.loads(line))
                 except (ValueError, KeyError, TypeError) as error:
                     self._failures.note("page", error)
-        code = self._process.wait()
+        code = process.wait()
         if not self._over:
             self._lost(ChildProcessError(f"its process ended with {code}"))
 

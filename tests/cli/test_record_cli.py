@@ -358,3 +358,14 @@ def test_lines_of_a_sketch_are_recorded(
     result = analyse(tmp_path / "r.h5")
     assert abs(result["angular_frequency"].value - OMEGA) < 5.0 * result["angular_frequency"].u
     assert "quantised" not in {finding.code for finding in result.findings} or step_m == 1e-3
+
+
+def test_a_page_that_cannot_start_costs_no_recording(
+    cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The page is only a viewer: the run is recorded, and a line says how to see it."""
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "nowhere"))
+    done = cli("record", "--simulate", "--seconds", "2", "--page", "--no-browser", "-o", tmp_path / "run.h5")
+    assert (tmp_path / "run.h5").exists()
+    assert done.code == 0
+    assert "springmass page" in done.err

@@ -38,7 +38,7 @@ def _record(seed: int) -> tuple[Track, float]:
 
 
 def test_the_period_of_very_small_swings_is_right_and_often_sound() -> None:
-    """No sound T_s is more than four u off, and where the frequency changes much it is sound."""
+    """No sound T_s is more than four u off, and half of them are sound."""
     sound = 0
     for seed in range(RECORDS):
         track, truth = _record(seed)
@@ -46,4 +46,4 @@ def test_the_period_of_very_small_swings_is_right_and_often_sound() -> None:
         assert said.wrong({"period_small_swings": truth}, 4.0) == {}, seed
         sound += "period_small_swings" in said.values and said.values["period_small_swings"].sound
     print(f"{sound} of {RECORDS} are sound")
-    assert sound >= 0.4 * RECORDS
+    assert sound >= 0.5 * RECORDS

@@ -10,6 +10,7 @@ import pytest
 
 from pipeline.analyse import analyse
 from pipeline.track import Track
+from tests.trials.grades import kinds
 
 TRIALS = int(os.environ.get("SPRINGMASS_TRIALS", "24"))
 NAMED = {"half_frequency", "driven", "overtone", "several_lines", "random_excitation"}
@@ -70,3 +71,11 @@ def test_what_only_looks_like_another_line_is_not_named(make: object) -> None:
     """None of some dozens of spring pendulums, of positions from the lowest point and of undamped runs is named."""
     assert callable(make)
     assert [(seed, found) for seed in range(TRIALS) if (found := codes(*make(seed)) & NAMED)] == []
+
+
+@pytest.mark.parametrize("kind", ["magnitude", "radial-acceleration", "magnet-pendulum"])
+def test_half_of_the_frequency_is_named(kind: str) -> None:
+    """Values that go through two cycles in each cycle of the motion are named, or no period is given."""
+    every = [kinds.trouble(kind, seed).said() for seed in range(4)]
+    assert all(said.warnings & {"half_frequency", "no_oscillation"} for said in every)
+    assert sum("half_frequency" in said.warnings for said in every) >= 3
