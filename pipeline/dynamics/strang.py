@@ -33,21 +33,23 @@ def flow(omega: float, gamma: float, t: Any, of: Any = math) -> Any:
     The matrix is :math:`e^{-\\gamma t}(C + \\gamma S,\\ S;\\ -\\omega^2 S,\\ C - \\gamma S)`. Below critical damping
     :math:`C = \\cos(\\omega_d t)` and :math:`S = \\sin(\\omega_d t)/\\omega_d`. Above it, the entries use
     :math:`\\kappa = \\sqrt{(\\gamma-\\omega)(\\gamma+\\omega)}`, the fast rate :math:`\\gamma + \\kappa` and the slow
-    rate :math:`\\omega^2/(\\gamma+\\kappa)`, without differences of nearly equal numbers. The functions are those of
-    ``math``, twenty times as fast for a single time, or with ``of=np`` those for an array of times.
+    rate :math:`\\omega^2/(\\gamma+\\kappa)`, without differences of nearly equal numbers. A drive that strong has
+    :math:`\\gamma < 0`, and there the slow rate is :math:`\\gamma - \\kappa`. The functions are those of ``math``,
+    twenty times as fast for a single time, or with ``of=np`` those for an array of times.
     """
-    if gamma < omega:
+    if abs(gamma) < omega:
         damped = math.sqrt((omega - gamma) * (omega + gamma))
         shrink = of.exp(-gamma * t)
         cosine, b = shrink * of.cos(damped * t), shrink * of.sin(damped * t) / damped
         return cosine + gamma * b, b, -omega * omega * b, cosine - gamma * b
     kappa = math.sqrt((gamma - omega) * (gamma + omega))
-    fast = gamma + kappa
-    slow = omega * (omega / fast)
+    larger = gamma + math.copysign(kappa, gamma)
+    smaller = omega * (omega / larger)
+    fast, slow = (larger, smaller) if gamma > 0.0 else (smaller, larger)
     late, soon = of.exp(-slow * t), of.exp(-fast * t)
     b = late * (t if kappa == 0.0 else -of.expm1(-2.0 * kappa * t) / (2.0 * kappa))
     middle = 0.5 * (late + soon)
-    d = (fast * soon - slow * late) / (2.0 * kappa) if kappa > 0.5 * gamma else middle - gamma * b
+    d = (fast * soon - slow * late) / (2.0 * kappa) if kappa > 0.5 * abs(gamma) else middle - gamma * b
     return middle + gamma * b, b, -omega * omega * b, d
 
 

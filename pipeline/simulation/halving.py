@@ -157,7 +157,7 @@ def _settings(
         )
         return
     # Drag stronger than the spring has its own, shorter time scale, which the step must resolve.
-    fast = omega * (1.0 + problem.equation.drag_per_m * problem.amplitude_m())
+    fast = omega * (1.0 + abs(problem.equation.drag_per_m) * problem.amplitude_m())
     longest = min(1.0 / fast, integrator.stable_step(problem) or math.inf)
     parts = math.floor(min(spacing_s / longest, MOST_STEPS)) + 1
     while parts * count <= MOST_STEPS:

@@ -360,9 +360,7 @@ def test_lines_of_a_sketch_are_recorded(
     assert "quantised" not in {finding.code for finding in result.findings} or step_m == 1e-3
 
 
-def test_a_page_that_cannot_start_costs_no_recording(
-    cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_page_that_cannot_start_costs_no_recording(cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The page is only a viewer: the run is recorded, and a line says how to see it."""
     monkeypatch.setattr(sys, "executable", str(tmp_path / "nowhere"))
     done = cli("record", "--simulate", "--seconds", "2", "--page", "--no-browser", "-o", tmp_path / "run.h5")
