@@ -5,7 +5,6 @@ import os
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -23,7 +22,7 @@ from storage.run_file.reading import RunFile, open_run
 from storage.wire_log.appending import WireLogWriter
 from storage.wire_log.records import LogHeader, RecordKind, SensorEntry
 from storage.wire_log.scanning import read_log
-from tests.wire import append, line
+from tests.wire import append, bits, line
 
 FAMILY = "line-protocol"
 START_NS = 7_000_000_000
@@ -62,12 +61,6 @@ def write(path: Path, header: LogHeader = HEADER, count: int = 200) -> Path:
     return path
 
 
-def columns(block: Block) -> list[Any]:
-    """Return a block's values, comparable."""
-    assert block.host_ns is not None
-    return [block.t.tolist(), [repr(x) for x in block.distance.tolist()], block.flags.tolist(), block.host_ns.tolist()]
-
-
 def samples_of(path: Path) -> Block:
     """Return the samples of a run file."""
     with open_run(path) as run:
@@ -88,7 +81,7 @@ def test_a_recovered_run_is_what_was_seen_live(tmp_path: Path) -> None:
     assert (report.damage.intact, report.damage.ended) == (True, True)
     with open_run(tmp_path / "run.h5") as run:
         run.verify()
-        assert columns(run.samples()) == columns(shown)
+        assert bits(run.samples()) == bits(shown)
         assert run.originals()[0].data == log.read_bytes()
         assert (run.info, run.header.title, run.header.scene) == (live.info("COM3", "simulated"), "Run 3", HEADER.scene)
         assert (run.header.format, run.traps, run.header.malformed_rows) == ("wire", (), 0)
