@@ -1,7 +1,5 @@
 """Synthetic runs with known truth, in plain numpy; shares no code with what it judges."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """Wire logs for tests: logs from bytes, records appended one by one, and a disk in memory that fails on request."""
 
-from __future__ import annotations
-
 import errno
 import json
 import math

@@ -1,7 +1,5 @@
 """``springmass analyse``: one line of JSON per input, and exit codes that tell what happened."""
 
-from __future__ import annotations
-
 import io
 import json
 import subprocess

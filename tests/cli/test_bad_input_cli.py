@@ -1,7 +1,5 @@
 """Bad input: one line that names the file and what to do; never a wrong number."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from pathlib import Path

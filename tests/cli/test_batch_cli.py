@@ -1,7 +1,5 @@
 """``springmass batch``: one table of many runs, made the same on every way."""
 
-from __future__ import annotations
-
 import csv
 import fcntl
 import json

@@ -1,7 +1,5 @@
 """``springmass record`` of boards and adapters as benches have them, on a pseudo-terminal."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 import os

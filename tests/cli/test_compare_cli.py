@@ -1,7 +1,5 @@
 """``springmass compare`` from the outside: what it says of runs of one spring, and what it refuses."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """``springmass convert``: an old recording into a run file and back, bit for bit, and nothing overwritten unasked."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """``springmass formats``: which families there are, and what one file is."""
 
-from __future__ import annotations
-
 import zipfile
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What the user states about a file is kept next to it, and every later command reads it."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Several inputs: one Table 1 and one report; folders of recordings."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re

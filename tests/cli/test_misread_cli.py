@@ -1,7 +1,5 @@
 """Files as people really have them: the command line goes in, and a period, a question or one line comes out."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """What a recording leaves out is asked as the command that was typed, and the line that is suggested works."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from pathlib import Path

@@ -1,7 +1,5 @@
 """``springmass record`` and ``recover`` over a pseudo-terminal: the real serial code, a simulated sensor."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """A scene to fill in, checked, given value by value, and noted beside a recording."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import tomllib

@@ -1,7 +1,5 @@
 """Run files that are not what was written: refused by name, looked at only when asked, never blessed."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

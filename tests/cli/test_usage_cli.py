@@ -1,7 +1,5 @@
 """What every command shares: help, version, and one line for a command line that cannot be."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """One run file, every reader: xarray with both engines, h5py, netCDF's own library and dump, NeXus."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Literal
 

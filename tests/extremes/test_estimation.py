@@ -1,7 +1,5 @@
 """Bad and extreme records: a finding or a one-line error, never a confident wrong number."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

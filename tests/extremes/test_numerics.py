@@ -1,7 +1,5 @@
 """What breaks a trajectory, and how: each case with the figure that it must show, and none of them quiet."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A sensor that shares no code with the decoders, a recording of it in a separate process, and a time limit."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import pty
@@ -18,7 +16,7 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType, SimpleNamespace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import pytest
@@ -126,7 +124,7 @@ class Feeder:
         self._mute, self._plugged = False, contextlib.ExitStack()
         self.port.symlink_to(self._plugged.enter_context(on_a_terminal(self._line)))
 
-    def __enter__(self) -> Feeder:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:

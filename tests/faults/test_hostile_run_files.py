@@ -1,7 +1,5 @@
 """Run files that were changed, and what is no file at all: one line of refusal at once, never a wrong number."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import socket

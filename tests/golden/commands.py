@@ -4,8 +4,6 @@ Only the command line is called, so nothing here holds a module, a class or a st
 because they may be worded anew. A number with an uncertainty is one entry.
 """
 
-from __future__ import annotations
-
 import contextlib
 import csv
 import functools

@@ -7,8 +7,6 @@ folder, ``{fresh}`` for an empty folder, and ``{copies}`` for one with copies of
 four are made when a command line names them.
 """
 
-from __future__ import annotations
-
 import random
 import re
 import shutil

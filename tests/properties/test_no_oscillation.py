@@ -1,7 +1,5 @@
 """What is no oscillation gets no period, of whatever quantity; what oscillates and rests, or beats, is told so."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Whatever goes into a run file comes out bit for bit, or not at all."""
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 from typing import Any

@@ -4,8 +4,6 @@ Factors that are powers of two change no rounding, so that what differs there is
 ten are what units differ by.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

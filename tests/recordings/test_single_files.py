@@ -1,7 +1,5 @@
 """What is peculiar to single recordings, as pairs of MotionSensor.vi; what every one reads as is a golden."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Dialects met in public: what oscillates has the period that scipy finds; the goldens hold what is read."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

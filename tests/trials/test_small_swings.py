@@ -1,7 +1,5 @@
 """The period of very small swings of hard and soft springs and of pendulums."""
 
-from __future__ import annotations
-
 import math
 import os
 

@@ -4,8 +4,6 @@ Each kind is that of a case of ``../shared/cases``; a seed draws rates, sizes an
 truth of a coefficient of a drag that is not there is zero.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

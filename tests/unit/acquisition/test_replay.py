@@ -1,7 +1,5 @@
 """Blocks, and their replay at its pace, from any second and in a loop, all without waiting."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

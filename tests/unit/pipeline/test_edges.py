@@ -1,7 +1,5 @@
 """Records on which a single fit of the whole is wrong: gaps, lost rows and wide swings; truth from closed forms."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -1,7 +1,5 @@
 """Angles, voltages, accelerations and forces through the whole analysis: their own units, and what needs a length."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

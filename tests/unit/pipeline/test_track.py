@@ -1,7 +1,5 @@
 """A track is made of anything array-like, or refused in one line."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

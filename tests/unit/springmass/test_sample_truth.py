@@ -1,7 +1,5 @@
 """The simulated recordings are reproducible, and each truth lies within three of its stated uncertainties."""
 
-from __future__ import annotations
-
 import json
 import re
 import sys

@@ -1,7 +1,5 @@
 """The recorder: the reading thread never waits, and what is not recorded is told."""
 
-from __future__ import annotations
-
 import errno
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 Written from manuals and public files' first lines: oscilloscopes, data loggers, telephones, serial monitors, sheets.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A stated law: by it alone results are stated, and the recording may contradict it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

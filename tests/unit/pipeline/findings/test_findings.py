@@ -1,7 +1,5 @@
 """Findings that name what a scene leaves out."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Strong drag and friction by the equation of motion, compared with the trials' own integration of it."""
 
-from __future__ import annotations
-
 import math
 import os
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Which of several lines is analysed: one that a drive or the mains keep up is not, and twice a frequency is named."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A pendulum of a stated length: the period of very small swings and g, from whatever is recorded of it."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

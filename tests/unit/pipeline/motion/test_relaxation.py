@@ -1,7 +1,5 @@
 """Relaxation motions give their rates; what only looks like one is not taken for one."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

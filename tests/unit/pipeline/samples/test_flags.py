@@ -1,7 +1,5 @@
 """Samples that a fit may not use are flagged; nothing is dropped, and nothing else is flagged."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

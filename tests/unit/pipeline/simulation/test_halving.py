@@ -1,7 +1,5 @@
 """Step halving: the stated error covers the true one, and what cannot be solved or stated is refused with a reason."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

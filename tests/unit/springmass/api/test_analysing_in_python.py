@@ -1,7 +1,5 @@
 """``springmass.analyse`` takes what a user has in hand, with scene, laws, range and options by name."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

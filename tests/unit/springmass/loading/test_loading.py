@@ -1,7 +1,5 @@
 """A run file is checked against its checksums and digests when it is loaded."""
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 

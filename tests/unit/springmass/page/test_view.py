@@ -1,7 +1,5 @@
 """What the page is sent is what the log holds."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The report of a run: its files, the numbers in them, and what must never stand in its page."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re

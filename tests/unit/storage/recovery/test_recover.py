@@ -1,7 +1,5 @@
 """Recovery: what the chain showed live is what the run file holds, and the log is inside it."""
 
-from __future__ import annotations
-
 import math
 import os
 from dataclasses import asdict

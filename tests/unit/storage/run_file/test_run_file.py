@@ -1,7 +1,5 @@
 """The run file: written as a whole, and believed only where it can be checked."""
 
-from __future__ import annotations
-
 import hashlib
 import itertools
 import json
