@@ -1,6 +1,5 @@
 """Several inputs: one Table 1 and one report; folders of recordings."""
 
-import re
 import shutil
 from pathlib import Path
 
@@ -70,17 +69,6 @@ def test_a_folder_gives_its_recordings_and_names_what_is_none(cli: Cli, bench: P
     velocities = [result["provenance"]["parameters"]["velocity"] for result in done.results]
     assert velocities == [str(bench / f"{name}_simulated_velocity.txt") for name in ("damped", "undamped")]
     assert all(word in done.complaint for word in ("2 recordings", "bench.toml", "notes.md"))
-
-
-def test_one_recording_is_counted_as_one(cli: Cli, bench: Path, tmp_path: Path) -> None:
-    """Singular and plural agree, for a folder with one recording and for the notes on it."""
-    alone = tmp_path / "alone"
-    alone.mkdir()
-    run = alone / "a.txt"
-    run.write_bytes((bench / "damped_simulated_position.txt").read_bytes())
-    assert cli("scene", run, "--note", "by hand", "--mark", "3=door").code == 0
-    done = cli("analyse", alone, "--json", "--accuracy", "fast")
-    assert {"1 recording", "1 other file", "1 note", "1 mark"} <= set(re.findall(r"1 [a-z]+(?: file)?\b", done.err))
 
 
 def test_a_folder_without_a_recording_is_refused(cli: Cli, bench: Path) -> None:

@@ -94,27 +94,6 @@ def test_a_recovered_run_is_what_was_seen_live(tmp_path: Path) -> None:
     assert abs(began.total_seconds()) < 2e-3
 
 
-def test_a_torn_log_gives_what_it_holds_and_says_so(tmp_path: Path) -> None:
-    """A log cut in a record and damaged in another gives the rest; the damage is in the provenance and the traps."""
-    log = write(tmp_path / "run.wire")
-    data = bytearray(log.read_bytes()[:-40])
-    victim = [record for record in read_log(log) if record.kind is RecordKind.DATA][100]
-    data[victim.offset + 30] ^= 4
-    log.write_bytes(data)
-    report = recover(log)
-    assert (report.damage.lost, report.damage.intact, report.damage.ended) == (1, False, False)
-    with open_run(report.runs[0].path) as run:
-        assert 195 <= len(run) <= 199
-        assert traps(run) == {"damaged_log", "cut_short"}
-        assert run.provenance["log"]["lost"] == 1
-        samples = run.samples()
-        after = int(np.flatnonzero(samples.flags & Flag.GAP_BEFORE)[0])
-        assert samples.t[after] - samples.t[after - 1] > 0.015
-        expected = 0.3 + 0.05 * np.sin(14 * (samples.t - samples.distance / 344.0))  # as at the ping
-        assert np.max(np.abs(samples.distance - expected)) < 1e-4
-        assert run.originals()[0].data == bytes(data)
-
-
 @pytest.mark.parametrize("event", [TimedOut(), Dropped()], ids=lambda event: event.kind)
 def test_no_frame_is_put_together_across_a_break(event: Event, tmp_path: Path) -> None:
     """Half a frame before lost reads and half a frame after them make no value."""

@@ -95,17 +95,19 @@ def test_a_standing_run_is_not_overwritten_unasked(path: Path) -> None:
 
 @pytest.mark.parametrize("error", [PortError("unplugged"), KeyboardInterrupt()])
 @pytest.mark.parametrize("samples", [10, 2 * CHUNK])
-def test_a_failing_source_leaves_nothing(tmp_path: Path, error: BaseException, samples: int) -> None:
-    """A failure between blocks passes through as it is and leaves neither the file nor a part of it."""
+def test_a_failing_source_leaves_the_old_state(tmp_path: Path, error: BaseException, samples: int) -> None:
+    """A failure between blocks passes through as it is; what stood there stands, and there is no part of a file."""
+    (tmp_path / "old.h5").write_bytes(b"old")
 
     def source() -> Iterator[Block]:
         yield block(samples)
         raise error
 
-    with pytest.raises(type(error)) as caught:
-        write_run(tmp_path / "a.h5", source(), INFO)
-    assert caught.value is error
-    assert list(tmp_path.iterdir()) == []
+    for name in ("new.h5", "old.h5"):
+        with pytest.raises(type(error)) as caught:
+            write_run(tmp_path / name, source(), INFO, overwrite=True)
+        assert caught.value is error
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {"old.h5": b"old"}
 
 
 @pytest.mark.parametrize(
