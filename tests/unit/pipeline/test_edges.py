@@ -11,6 +11,7 @@ from pipeline.analysis import Analysis
 from pipeline.bench.scene import Scene
 from pipeline.track import Track
 from tests.sampling import sampled
+from tests.synthetic import solved
 
 NOISES, RATES, GAPS = (1e-4, 3e-4, 2e-3), (50, 100), (0.05, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 30.0)
 
@@ -90,14 +91,8 @@ def test_lost_rows_are_named_and_covered(seed: int, rate: int) -> None:
 )
 def test_a_wide_pendulum(quadratic: float, degrees: int) -> None:
     """The equation of motion is solved by scipy; nobody touches the bob, and the pivot is fixed."""
-    from scipy.integrate import solve_ivp
-
     t, square, start = np.arange(3000) / 50, (2.0 * math.pi / 1.2) ** 2, math.radians(degrees)
-
-    def moves(_: float, z: np.ndarray) -> list[float]:
-        return [z[1], -square * math.sin(z[0]) - quadratic * z[1] * abs(z[1]) - 0.002 * z[1]]
-
-    angle = solve_ivp(moves, (0.0, 60.0), [start, 0.0], t_eval=t, rtol=1e-10, atol=1e-12).y[0]
+    angle, _ = solved(lambda _, x, v: -square * math.sin(x) - quadratic * v * abs(v) - 0.002 * v, start, t)
     angle += math.radians(0.1) * np.random.default_rng(degrees).standard_normal(t.size)
     step = math.radians(0.25)
     scene = Scene(pendulum_length_m=(9.81 / square, 1e-6))

@@ -38,27 +38,6 @@ def test_the_law_of_the_scene_is_the_stated_one() -> None:
     assert not codes_of(analysis)
 
 
-def test_where_no_law_fits_the_stated_one_is_not_charged_alone() -> None:
-    """An amplitude that no law makes gives no_law_fits, with the nearest law, whichever was stated."""
-    analysis = analyse(recorded(0.05 * (1.0 - 0.004 * T + 0.1 * np.sin(0.2 * T))), Scene(damping_law="quadratic"))
-    assert analysis.damping.best.rejected
-    assert "no_law_fits" in codes_of(analysis)
-    assert "stated_law_rejected" not in codes_of(analysis)
-
-
-def test_coefficients_that_are_not_determined_are_upper_limits() -> None:
-    """Of ten noisy periods neither drag is determined; both keep value and u, which the limit exceeds."""
-    t = T[:800]
-    y = 0.2 + 0.05 * np.exp(-0.003 * t) * np.cos(8.3 * t)
-    analysis = analyse(Track.from_arrays(t, y + 2e-3 * np.random.default_rng(5).standard_normal(t.size)))
-    coefficients = analysis.derived.coefficients
-    assert set(coefficients) == {"gamma", "beta"}
-    for x in coefficients.values():
-        assert isinstance(x, UpperLimit)
-        assert x.u > abs(x.value)
-        assert x.limit > max(x.value, 0.0)
-
-
 @pytest.mark.parametrize("ratio", [0.0, 0.3, 1.0, 2.0])
 def test_an_upper_limit_covers_in_at_least_95_percent(ratio: float) -> None:
     """Of normal estimates of what is not negative it lies above the truth in 95 % or more."""

@@ -9,6 +9,7 @@ from pipeline.analyse import analyse
 from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
 from pipeline.track import Track
+from tests.synthetic import solved
 from tests.trials.grades import kinds
 
 
@@ -99,7 +100,7 @@ def test_the_free_oscillation_of_a_driven_bob_is_analysed(ratio: float, gamma: f
     """Its frequency and damping rate are those of the transient, for drives below and above the resonance."""
     omega, t = 8.3, np.arange(3000) / 50.0
     drive = ratio * omega
-    x, _ = kinds.solved(
+    x, _ = solved(
         lambda at, x, v: -(omega**2) * x - 2.0 * gamma * v + 0.02 * abs(omega**2 - drive**2) * math.sin(drive * at),
         0.0,
         t,
