@@ -65,15 +65,6 @@ def test_an_impossible_scene_is_one_line(cli: Cli, recording: Path, tmp_path: Pa
     assert len(done.complaint) < 1000
 
 
-def test_json_writes_no_files(cli: Cli, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Results are files only where a folder for them was named."""
-    here = tmp_path / "here"
-    here.mkdir()
-    monkeypatch.chdir(here)
-    assert cli("analyse", "--json", recording).code == 0
-    assert list(here.iterdir()) == []
-
-
 @pytest.mark.parametrize("count", [1, 2])
 def test_a_folder_that_cannot_be_made_costs_one_line(cli: Cli, recording: Path, count: int) -> None:
     """A file stands where the results should go: the results are printed, one line says so, exit code 2."""

@@ -53,13 +53,6 @@ def analysed(cli: Cli, path: Path) -> Any:
     return done.results[0]
 
 
-def test_a_last_row_cut_inside_its_time_is_left_out_and_told(cli: Cli, write: Write, rows: list[bytes]) -> None:
-    """Its time is unknown, so that it cannot be a missing sample."""
-    result = analysed(cli, write([*rows[:-1], b"9.9"]))
-    assert result["input"]["samples"] == len(rows) - 1
-    assert "truncated_row" in {f["code"] for f in result["findings"]}
-
-
 @pytest.mark.parametrize("start", ["nothing", "header"])
 def test_a_hundred_megabytes_of_one_line_are_refused_at_once(cli: Cli, write: Write, start: str) -> None:
     """The first MiB without a line end is enough."""

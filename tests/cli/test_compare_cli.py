@@ -33,14 +33,6 @@ def written_run(
     return str(write_recording(path, noisy(truth, times(seconds), 1e-4, seed)))
 
 
-def test_another_spring_is_told_apart_from_an_exchange(tmp_path: Path, cli: Cli) -> None:
-    """Two springs under one bob differ, and nothing is said to be exchanged."""
-    runs = [written_run(tmp_path / f"{o}.txt", omega=o, seconds=20.0) for o in (8.0, 8.4)]
-    (result,) = cli("compare", *runs, "--scene", BARE_SCENE, "--json").results
-    assert result["comparison"]["exchanged"] == []
-    assert [f["code"] for f in result["findings"]] == ["springs_differ"]
-
-
 def test_a_report_is_written_where_it_is_wanted(tmp_path: Path, cli: Cli) -> None:
     """The folder holds the page with the figure of the constants, and the JSON as printed; without --output nothing."""
     out = tmp_path / "both"

@@ -82,19 +82,6 @@ def test_a_simulated_run_becomes_a_run_file_with_its_truth(recorded: Path) -> No
     assert not recorded.with_suffix(".wire").exists()
 
 
-def test_the_run_rebuilt_from_its_own_wire_bytes_is_the_same(cli: Cli, tmp_path: Path, recorded: Path) -> None:
-    """The log that travels inside a run gives the same samples through the same decoders."""
-    with open_run(recorded) as run:
-        (log,) = run.originals()
-        first = run.samples()
-    (tmp_path / "again.wire").write_bytes(log.data)
-    assert cli("recover", tmp_path / "again.wire").code == 0
-    with open_run(tmp_path / "again.h5") as run:
-        second = run.samples()
-    for name in ("t", "distance", "flags", "host_ns"):
-        np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
-
-
 def test_another_speed_of_sound_is_applied_to_the_same_echoes(cli: Cli, tmp_path: Path, recorded: Path) -> None:
     """A run recorded with 344 m/s comes out of its log with any other speed, every distance in proportion."""
     assert cli("convert", recorded, tmp_path / "run.wire").code == 0

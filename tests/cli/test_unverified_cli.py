@@ -66,12 +66,3 @@ def test_what_is_made_of_it_is_never_blessed(cli: Cli, edited: Path, tmp_path: P
         (finding,) = (f for f in done.results[0]["findings"] if f["code"] == "unverified")
         assert finding["severity"] == "error"
         assert "edited.h5" in finding["message"]
-
-
-def test_unverified_says_nothing_of_a_sound_file(cli: Cli, recording: Path, tmp_path: Path) -> None:
-    """A file that verifies gets no mark for having been asked about."""
-    path = tmp_path / "run.h5"
-    assert cli("convert", recording, path).code == 0
-    done = cli("analyse", "--json", "--unverified", path)
-    assert (done.code, done.err) == (0, "")
-    assert "unverified" not in {f["code"] for f in done.results[0]["findings"]}

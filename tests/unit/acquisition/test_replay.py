@@ -41,19 +41,6 @@ def test_a_loop_has_a_gap_before_each_further_turn() -> None:
         assert not block.flags[1:].any()
 
 
-def test_flag_values_are_those_of_the_run_file() -> None:
-    """The bits are written to files and may not move."""
-    assert {flag.name: flag.value for flag in Flag} == {
-        "MISSING": 1,
-        "FALSE_ECHO": 2,
-        "CLIPPED": 4,
-        "DUPLICATE_TIME": 8,
-        "NON_MONOTONIC_TIME": 16,
-        "MALFORMED": 32,
-        "GAP_BEFORE": 64,
-    }
-
-
 def test_slices_and_joins_keep_the_quantity_and_two_are_not_joined() -> None:
     """Volts stay volts, and do not follow metres."""
     volts = Block(0, np.zeros(4), np.zeros(4), np.zeros(4, np.uint8), quantity="voltage", unit="V")

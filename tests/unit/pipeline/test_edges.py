@@ -156,13 +156,3 @@ def test_a_rest_position_that_moves_shifts_no_period(speed_m_per_s: float) -> No
     analysis = analyse(Track.from_arrays(t, y + 5e-4 * np.random.default_rng(1).standard_normal(t.size)))
     assert abs(pulled(analysis, 0.79)) < 3.0
     assert codes(analysis, "warning") == {"rest_drift"}
-
-
-def test_fewer_than_two_samples_a_period_at_uneven_times_give_the_period() -> None:
-    """No test of harmonics needs more."""
-    rng = np.random.default_rng(1)
-    t = np.sort(rng.uniform(0.0, 200.0, 300))
-    y = 0.3 + 0.05 * np.exp(-0.004 * t) * np.cos(math.tau * t / 0.8) + 2e-4 * rng.standard_normal(t.size)
-    analysis = analyse(Track.from_arrays(t, y))
-    assert abs(pulled(analysis, 0.8)) < 3.0
-    assert codes(analysis, "warning") == set()

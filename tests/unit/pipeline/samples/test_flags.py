@@ -22,14 +22,6 @@ def flagged(t: F8, y: F8, bit: Quality, flags: U8 | None = None) -> list[int]:
     return rows
 
 
-def test_missing_samples_keep_their_place() -> None:
-    """NaN and infinity are no distances."""
-    t, y = swing()
-    y[[3, 500]] = np.nan
-    y[700] = np.inf
-    assert flagged(t, y, Quality.MISSING) == [3, 500, 700]
-
-
 def test_times_that_repeat_or_run_back_are_flagged() -> None:
     """A repeated time is a duplicate, one behind the latest is not monotonic, and so is one that is no number."""
     t, y = swing()
