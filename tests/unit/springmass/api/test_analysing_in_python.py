@@ -135,3 +135,12 @@ def test_runs_are_compared(damped_run: Path) -> None:
         sm.compare([undamped])
     with pytest.raises(AnalysisError, match="got 3 for 2"):
         sm.compare([undamped, undamped], [scene] * 3)
+
+
+def test_a_scale_that_may_drift_leaves_no_sound_damping_rate() -> None:
+    """A sensor that warms by 1 % in a minute lets the amplitude fall faster; the period stays sound."""
+    t, rng = np.arange(6000) / 100, np.random.default_rng(4)
+    y = (0.25 + 0.05 * np.exp(-0.01 * t) * np.cos(8.0 * t)) * (1.0 - 0.01 * t / 60) + 3e-4 * rng.standard_normal(t.size)
+    grades = sm.analyse((t, y), unit="m").result["grades"]
+    assert grades["period"]["grade"] == "sound"
+    assert grades["damping_rate"] == {"grade": "uncertain", "reasons": ["rest_drift"]}
