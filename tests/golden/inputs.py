@@ -200,6 +200,7 @@ _ODD: dict[str, Callable[[], str | bytes]] = {
     "reported.csv": lambda: (
         "run,name,value,u,unit\ndamped_simulated_position,T,0.79,0.01,s\n"
         "undamped_simulated_position,T,0.790066,0.00002,s\ndamped_simulated_position,k,14.0,0.1,N/m\n"
+        "damped_simulated_position,T,0.9,0.001,s\ndamped_simulated_position,colour,3,,\n"
     ),
     "hooke.csv": lambda: (
         "mass_kg,rest_m\n" + "".join(f"{mass},{0.20 + 9.81 * mass / 14.0:.4f}\n" for mass in (0.1, 0.15, 0.2, 0.25))

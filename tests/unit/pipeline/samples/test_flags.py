@@ -33,17 +33,6 @@ def test_times_that_repeat_or_run_back_are_flagged() -> None:
     assert flagged(t, y, Quality.NON_MONOTONIC_TIME) == [20, 30, 41, 42, 43, 44]
 
 
-def test_flags_of_the_recording_stay() -> None:
-    """Bits known before the analysis are kept, and a gap before a sample does not exclude it."""
-    t, y = swing()
-    flags = np.zeros(1000, np.uint8)
-    flags[5], flags[6] = Quality.MALFORMED, Quality.GAP_BEFORE
-    track = Track.from_arrays(t, y, flags=flags)
-    found = analyse(track)
-    assert (found.flags[5], found.flags[6]) == (Quality.MALFORMED, Quality.GAP_BEFORE)
-    np.testing.assert_array_equal(track.flags, flags)
-
-
 @pytest.mark.parametrize("height_m", [0.02, 2.0, -0.1])
 @pytest.mark.parametrize("rows", [[0], [1], [400], [425], [500, 501], [998], [999]])
 def test_false_echoes_are_flagged_and_hardly_a_neighbour(height_m: float, rows: list[int]) -> None:
