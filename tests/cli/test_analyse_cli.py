@@ -1,7 +1,5 @@
 """``springmass analyse``: one line of JSON per input, and exit codes that tell what happened."""
 
-from __future__ import annotations
-
 import io
 import json
 import subprocess
@@ -65,15 +63,6 @@ def test_an_impossible_scene_is_one_line(cli: Cli, recording: Path, tmp_path: Pa
     assert str(scene) in done.complaint
     assert done.complaint.isprintable()
     assert len(done.complaint) < 1000
-
-
-def test_json_writes_no_files(cli: Cli, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Results are files only where a folder for them was named."""
-    here = tmp_path / "here"
-    here.mkdir()
-    monkeypatch.chdir(here)
-    assert cli("analyse", "--json", recording).code == 0
-    assert list(here.iterdir()) == []
 
 
 @pytest.mark.parametrize("count", [1, 2])

@@ -1,11 +1,8 @@
 """``springmass formats``: which families there are, and what one file is."""
 
-from __future__ import annotations
-
 import zipfile
 from pathlib import Path
 
-import springmass
 from acquisition.clock import VirtualClock
 from storage.recorder import Recorder
 from storage.run_file.reading import open_run
@@ -25,24 +22,6 @@ def write_log(path: Path, channels: int) -> None:
 def facts_of(out: str) -> dict[str, str]:
     """Return the lines of a description, value by name; of several traps the last."""
     return dict(line.split(None, 1) for line in out.splitlines())
-
-
-def test_a_recording_is_described(cli: Cli, data: Path) -> None:
-    """Family, kind, samples, rate and clock; what is rounded for people is exact as JSON."""
-    done = cli("formats", data / "sixty_hz_simulated_position.txt")
-    assert (done.code, done.err) == (0, "")
-    facts = facts_of(done.out)
-    assert (facts["format"], facts["kind"], facts["rate_hz"], facts["clock"]) == (
-        "motion-sensor",
-        "simulated",
-        "60",
-        "nominal",
-    )
-    loaded = springmass.load(data / "sixty_hz_simulated_position.txt").loaded
-    assert facts["samples"] == str(len(loaded.samples))
-    (exact,) = cli("formats", "--json", data / "sixty_hz_simulated_position.txt").results
-    assert (exact["to_s"], exact["quantum_m"]) == (float(loaded.samples.t[-1]), loaded.info.quantum_m)
-    assert (exact["sha256"], exact["missing"]) == (loaded.sha256, 0)
 
 
 def test_a_wire_log_is_an_input(cli: Cli, data: Path, tmp_path: Path) -> None:

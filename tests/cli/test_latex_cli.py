@@ -1,7 +1,5 @@
 """The LaTeX that the commands write: every template and table compiles, and no line is too wide."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A damping law on the command line: stated by an option, a scene file or a table of runs."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

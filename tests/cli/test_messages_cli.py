@@ -3,8 +3,6 @@
 A defect is one line with exit code 70; what the system or the user does wrong is never called one.
 """
 
-from __future__ import annotations
-
 import io
 import subprocess
 import sys

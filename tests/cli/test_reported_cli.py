@@ -1,7 +1,5 @@
 """``springmass compare --reported``: mistakes in what somebody printed, on the terminal, in JSON and on the page."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What every command shares: help, version, and one line for a command line that cannot be."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -45,11 +43,3 @@ def test_every_finding_is_explained(cli: Cli) -> None:
     wrong = cli("explain", "clip")
     assert (wrong.code, wrong.out) == (2, "")
     assert "clipped" in wrong.complaint
-
-
-@pytest.mark.parametrize("option", ["--unit", "--rate-hz", "--unverified"])
-def test_an_option_of_reading_names_the_way_of_a_command_of_many_files(cli: Cli, option: str) -> None:
-    """What 0.3.0 took as an option is answered with the words to type instead."""
-    done = cli("compare", "a.csv", "b.csv", option, "cm")
-    key = option.removeprefix("--").replace("-", "_")
-    assert (done.code, done.out, f"--read {key}=" in done.err) == (2, "", True)

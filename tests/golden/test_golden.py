@@ -1,7 +1,5 @@
 """A sample of the goldens, and what counts as a move; `make golden` compares them all."""
 
-from __future__ import annotations
-
 import shlex
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The server of the window: who may change something, what it takes and ends, and where it keeps what it is given."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import os

@@ -1,7 +1,5 @@
 """Files are written whole or not at all."""
 
-from __future__ import annotations
-
 import os
 import threading
 from pathlib import Path
@@ -50,22 +48,6 @@ def test_a_pipe_or_device_is_not_replaced(tmp_path: Path) -> None:
     with pytest.raises(WriteFailed, match="choose the name of a file"):
         write_whole(path, "text")
     assert path.is_fifo()
-    assert list(tmp_path.iterdir()) == [path]
-
-
-@pytest.mark.parametrize("error", [ValueError("in the middle"), KeyboardInterrupt()])
-def test_a_failing_body_leaves_the_old_state(tmp_path: Path, error: BaseException) -> None:
-    """Whatever the body raises passes through, the temporary file goes and the old content stands."""
-    path = write_whole(tmp_path / "a", "old")
-
-    def half() -> None:
-        with whole_file(path) as temporary:
-            temporary.write_text("half")
-            raise error
-
-    with pytest.raises(type(error)):
-        half()
-    assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
 
 

@@ -1,7 +1,5 @@
 """Arrays, JSON, sound and text of other programs: a file in, samples out; what is no recording is named."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

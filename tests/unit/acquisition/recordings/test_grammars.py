@@ -1,7 +1,5 @@
 """Numbers, times and blocks in the forms that programs, locales and instruments write: a file in, samples out."""
 
-from __future__ import annotations
-
 import datetime
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Samples that a fit may not use are flagged; nothing is dropped, and nothing else is flagged."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -22,14 +20,6 @@ def flagged(t: F8, y: F8, bit: Quality, flags: U8 | None = None) -> list[int]:
     assert found.size == t.size
     rows: list[int] = np.flatnonzero(found & np.uint8(bit)).tolist()
     return rows
-
-
-def test_missing_samples_keep_their_place() -> None:
-    """NaN and infinity are no distances."""
-    t, y = swing()
-    y[[3, 500]] = np.nan
-    y[700] = np.inf
-    assert flagged(t, y, Quality.MISSING) == [3, 500, 700]
 
 
 def test_times_that_repeat_or_run_back_are_flagged() -> None:

@@ -1,7 +1,5 @@
 """Arrays in memory: units are read or refused, never ignored."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
