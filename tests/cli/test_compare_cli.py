@@ -82,10 +82,13 @@ def test_many_masses_and_hookes_law(tmp_path: Path, cli: Cli) -> None:
     assert all(f'id="figure-{chart}' in page for chart in ("masses", "hooke"))
 
 
-def test_a_static_measurement_may_have_decimal_commas(analysed: list[springmass.Run], tmp_path: Path) -> None:
+@pytest.mark.parametrize("head", ["mass_g;position_cm", "Masse (g);Auslenkung (cm)", "load (g);reading (cm)"])
+def test_a_static_measurement_may_have_decimal_commas(
+    head: str, analysed: list[springmass.Run], tmp_path: Path
+) -> None:
     """As a sheet of another language writes it, with units in its names."""
     rows = "".join(f"{g};{y:.2f}\n".replace(".", ",") for g, y in ROWS)
-    (tmp_path / "hooke.csv").write_text(f"mass_g;position_cm\n{rows}")
+    (tmp_path / "hooke.csv").write_text(f"{head}\n{rows}")
     found = springmass.compare(analysed, hooke=tmp_path / "hooke.csv").hooke
     assert found is not None
     assert found.constant.value == pytest.approx(14.0, abs=0.2)

@@ -160,6 +160,8 @@ HEADINGS: dict[str, tuple[str, str, float, Said]] = {
     "Keithley": ("Index,Reading,Unit,Relative Time\n" + rows("{i},{x},Volt DC,{t:.4f}"), "Reading", V, {"--unit": "V"}),
     "Origin": ("A(X)\tB(Y)\nTime\tPosition\ns\tm\n\n" + rows("{t:.2f}\t{x}"), "Position", 1.0, {}),
     "numpy": ("# time[s] position[m]\n" + rows("{t:.18e} {x:.18e}"), "position", 1.0, {}),
+    "capitals": (" T(S)  X(M)\n" + rows("{t:.7e} {x}"), "X", 1.0, {}),
+    "stamps": ("ts,distance (m)\n" + rows("{t:.2f},{x}"), "distance", 1.0, {}),
     "hours": ("Time (h),Position (mm)\n" + rows("{h:.9f},{x}"), "Position", 1e-3, {}),
     "ticks": ("time (ticks),distance (m)\n" + rows("{ms},{x}"), "distance", 1.0, {"--time-unit": "ms"}),
     "inches": ("time (s),distance (in)\n" + rows("{t:.2f},{x}"), "distance", 0.0254, {}),
