@@ -141,13 +141,3 @@ def test_steps_as_large_as_the_motion_are_part_of_the_uncertainties(step: float)
             assert "no_law_fits" not in codes(analysis)
     assert len(pulls) >= 4
     assert np.quantile(pulls, 0.9, axis=0).max() < 2.8
-
-
-@pytest.mark.parametrize("speed_m_per_s", [-0.03, 0.06])
-def test_a_rest_position_that_moves_shifts_no_period(speed_m_per_s: float) -> None:
-    """Two gliders that drift along a track give the period, and their residuals are noise."""
-    t = np.arange(600) / 50.0
-    y = 0.9 + speed_m_per_s * t + 0.05 * np.exp(-0.01 * t) * np.cos(math.tau * t / 0.79)
-    analysis = analyse(Track.from_arrays(t, y + 5e-4 * np.random.default_rng(1).standard_normal(t.size)))
-    assert abs(pulled(analysis, 0.79)) < 3.0
-    assert codes(analysis, "warning") == {"rest_drift"}

@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 
 from pipeline.analyse import analyse
-from pipeline.track import F8, U8, Quality, Track
+from pipeline.track import F8, Quality, Track
 from tests.synthetic import Truth, noisy, times
 
 
-def swing(seconds: float = 10.0, sigma_m: float = 1e-4, seed: int = 1) -> tuple[F8, F8]:
+def swing() -> tuple[F8, F8]:
     """Return times and distances of a bob."""
-    t = times(seconds)
-    return t, noisy(Truth(), t, sigma_m, seed)
+    t = times(10.0)
+    return t, noisy(Truth(), t, 1e-4, 1)
 
 
-def flagged(t: F8, y: F8, bit: Quality, flags: U8 | None = None) -> list[int]:
+def flagged(t: F8, y: F8, bit: Quality) -> list[int]:
     """Return the rows that carry a flag after the analysis."""
-    found = analyse(Track.from_arrays(t, y, flags=flags)).flags
+    found = analyse(Track.from_arrays(t, y)).flags
     assert found.size == t.size
     rows: list[int] = np.flatnonzero(found & np.uint8(bit)).tolist()
     return rows
