@@ -173,22 +173,24 @@ class _Search:
     def free(self, peak: Peak) -> tuple[Mode, F8]:
         """Refine a peak's frequency, decide whether it decays, and choose the degree of its envelope.
 
-        Frequency and decay come from Gauss-Newton steps with columns w and :math:`\\tau w`. The ratio of the second
-        column's complex coefficient to the first's is :math:`-\\delta + 2\\pi i\\,\\Delta f`.
+        Frequency and decay come from Gauss-Newton steps with columns w and :math:`\\tau w`. Here w falls with the decay
+        so far, and :math:`\\tau` counts from the centre of its energy, so that the two are orthogonal. The ratio of the
+        second column's complex coefficient to the first's is :math:`-\\Delta\\delta + 2\\pi i\\,\\Delta f`.
         """
         unit = peak.density * self.blocks.samples
         f, rate, u_rate = peak.frequency_hz, 0.0, math.inf
         tau = self.blocks.t - 0.5 * self.blocks.seconds
-        longest = 0.5 / self.blocks.seconds
-        for _ in range(4):
-            angle = 2.0 * math.pi * f * tau
-            pair = np.stack([np.cos(angle), -np.sin(angle)]) * self.blocks.weight
-            values, cofactors, _ = self.fit(np.concatenate([pair, pair * tau]).T)
+        longest = math.pi / self.blocks.seconds
+        for _ in range(ROUNDS):
+            angle, fall = 2.0 * math.pi * f * tau, np.exp(-rate * tau) * self.blocks.weight
+            pair = np.stack([np.cos(angle), -np.sin(angle)]) * fall
+            late = tau - float(np.average(tau, weights=fall**2))
+            values, cofactors, _ = self.fit(np.concatenate([pair, pair * late]).T)
             z, slope = values.view(np.complex128).tolist()
-            ratio = slope / z
-            rate, u_rate = -ratio.real, math.sqrt(max(cofactors[2, 2] * unit, 0.0)) / abs(z)
-            step = min(max(ratio.imag / (2.0 * math.pi), -longest), longest)
-            f += step
+            step = slope / z
+            step *= longest / max(longest, abs(step))
+            f, rate = f + step.imag / (2.0 * math.pi), rate - step.real
+            u_rate = math.sqrt(max(cofactors[2, 2] * unit, 0.0)) / abs(z)
             if abs(step) < 2e-3 * longest:
                 break
         # A varying mode has a wider spectrum, which must not overlap the variations of the main oscillation.
