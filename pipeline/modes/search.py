@@ -41,13 +41,16 @@ HIGHEST_MODE = 3.4
 LONGEST_SEARCH = 4096
 
 
-def find_modes(samples: Samples, windows: Windows) -> Modes:
+def find_modes(samples: Samples, windows: Windows, known: F8 | float = 0.0) -> Modes:
     """Search for lines beside the main oscillation.
 
     The main oscillation is first removed as smooth curves through the windows' values. Then it is fitted together with
     each line by least squares, with slowly varying amplitude and phase, to block means over a twelfth of a period.
     A mode within a few reciprocals of the record's length of the main frequency is not searched for. It beats too
     slowly to be distinguished from a change of the amplitude.
+
+    Samples far from the main oscillation are left out. ``known`` (n,) is the position of modes that an earlier search
+    found, m: without it, the first swings of a mode that falls quickly would be left out too.
     """
     used = windows.used
     t = samples.track.t[used]
@@ -57,11 +60,12 @@ def find_modes(samples: Samples, windows: Windows) -> Modes:
     if float(t[-1] - t[0]) > LONGEST_SEARCH * turn:
         return Modes(samples)
     carrier = Carrier.through(windows, float(t[0]), float(t[-1]))
-    residual = samples.track.y[used] - carrier.position(t)
-    spread = mad_sigma(residual)
+    residual = samples.track.y - carrier.position(samples.track.t)
+    left, residual = (residual - known)[used], residual[used]
+    spread = mad_sigma(left)
     if spread == 0.0:
         return Modes(samples, carrier=carrier)
-    believed = np.abs(residual) <= 8.0 * spread
+    believed = np.abs(left) <= 8.0 * spread
     blocks = Blocks.of(t[believed], residual[believed], turn / 12.0, samples.track.rate_hz)
     band = _band(carrier, blocks)
     multiples = tuple(turns * carrier.angular_frequency / (2.0 * math.pi) for turns in HARMONICS)
