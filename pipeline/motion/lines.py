@@ -197,7 +197,7 @@ class DecayingLines:
         """Return whether the parameter of a number of the first line differs significantly from the second one's."""
         weights = np.zeros(self.values.size)
         weights[[number, number + 4]] = -1.0, 1.0
-        return abs(weights @ self.values) > SIGNIFICANT * math.sqrt(weights @ self.covariance @ weights)
+        return abs(float(weights @ self.values)) > SIGNIFICANT * math.sqrt(weights @ self.covariance @ weights)
 
     def listed(self, unit: str) -> str:
         """Return frequencies and amplitudes at the start in words, the strongest first."""
