@@ -13,7 +13,7 @@ help:
 	@echo "make test     the tests, in two processes (WORKERS=n for others): 3 minutes on two cores"
 	@echo "make golden   every frozen output against today's, as a table of what moved: 1 minute"
 	@echo "make golden-freeze  freeze the outputs that moved; the commit's message says what moved and why"
-	@echo "make trials   what many seeds, kills and long runs show: an hour"
+	@echo "make trials   what many seeds, kills and long runs show (TRIALS=200 KILLS=100, or others): an hour"
 	@echo "make nightly  trials, docs, firmware, smallest versions, planted faults and checks of the project's files: two hours"
 	@echo "make mutants  planted faults, and whether tests and goldens notice them: a quarter of an hour"
 	@echo "make accuracy what the estimates must reach, over 2000 seeds (SEEDS=n for others)"
@@ -50,7 +50,7 @@ golden-freeze: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.golden --freeze
 
 trials: $(VENV)/.installed-dev
-	SPRINGMASS_TRIALS=2000 SPRINGMASS_KILLS=500 SPRINGMASS_EXAMPLES=nightly \
+	SPRINGMASS_TRIALS=$(or $(TRIALS),200) SPRINGMASS_KILLS=$(or $(KILLS),100) SPRINGMASS_EXAMPLES=nightly \
 	$(BIN)/python -m pytest -m trials -n $(WORKERS) --dist loadfile
 
 nightly: $(VENV)/.installed-dev

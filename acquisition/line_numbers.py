@@ -50,7 +50,7 @@ _NUMBER = {
 }
 UPTIME = "time since start:"
 _CONTROL = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|[@-Z\\-_])")
-_ESP_LOG = re.compile(r"^[EWIDV] \((\d{1,10})\) (?=[\w.-]+: )", re.ASCII | re.MULTILINE)
+_ESP_LOG = re.compile(r"^[EWIDV] \((?:(\d{1,10})|(\d\d:\d\d:\d\d\.\d{3}))\) (?=[\w.-]+: )", re.ASCII | re.MULTILINE)
 _STAMP = re.compile(r"(?<![\w.])\d{1,4}([-/.])\d{1,2}\1\d{1,4}(?![\d.])|\d{1,2}:\d\d:\d\d(?:[.,:]\d+)?", re.ASCII)
 _AFTER = re.compile(r"[ ]?[\"')\]]?[,;]?[ \"']?(°?[^\W\d_]+|%)(?![^\W\d_]|[\"')\] ]*[:=])(/?)")
 _WORD = re.compile(r"[A-Z]?[^\W\d_A-Z]+|[^\W\d_a-z]+|%")
@@ -89,9 +89,11 @@ class Number(NamedTuple):
 def uncoloured(text: str) -> str:
     """Return text without the colours of a terminal, and with the times of a log of ESP-IDF in words.
 
-    Such a line is ``I (4140) hcsr04: Distance: 27.17 cm``, with the milliseconds since the start of the board.
+    Such a line is ``I (4140) hcsr04: Distance: 27.17 cm``, with the milliseconds since the start of the board, or with
+    its clock.
     """
-    return _ESP_LOG.sub(rf"{UPTIME} \1 ms, ", _CONTROL.sub("", text) if "\x1b" in text else text)
+    bare = _CONTROL.sub("", text) if "\x1b" in text else text
+    return _ESP_LOG.sub(lambda match: f"{UPTIME} {match[1]} ms, " if match[1] else f"{match[2]} ", bare)
 
 
 def has_decimal_comma(text: str, separator: str = "") -> bool | None:

@@ -1,7 +1,5 @@
 """What every test may ask for: output of one width, a cluster, and hypothesis that draws the same each time."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal

@@ -1,7 +1,5 @@
 """Courses of simulated recordings, in plain numpy, and what the folder of a course's results holds."""
 
-from __future__ import annotations
-
 import csv
 import math
 import os

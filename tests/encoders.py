@@ -1,7 +1,5 @@
 """Encoders of every family, written from the data sheets and not from the decoders, so that each checks the other."""
 
-from __future__ import annotations
-
 import binascii
 import math
 from collections.abc import Callable, Iterable

@@ -8,8 +8,6 @@ the four packages if the code has moved. If it does not stand exactly once, the 
 code is 1 if more than ``--most`` slip through or more than ``MOST_STALE`` are stale.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Two simulated runs of one spring, bare and with a disc, as files, and tables of what somebody prints about them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A few of many cases in `make test`, the others among the trials."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

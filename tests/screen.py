@@ -1,7 +1,5 @@
 """A pseudo-terminal to run the program on, and the screen that a reader of it sees."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import re
@@ -13,7 +11,7 @@ import termios
 import time
 from collections.abc import Mapping
 from pathlib import Path
-from types import TracebackType
+from typing import Self
 
 _CONTROL = re.compile(r"\x1b\[(?P<digits>[?\d;]*)(?P<final>[A-Za-z])|\x1b[=>78]")
 
@@ -103,12 +101,10 @@ class OnTerminal:
         os.close(slave)
         self._master = master
 
-    def __enter__(self) -> OnTerminal:
+    def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self.process.poll() is None:
             self.process.kill()
             self.process.wait()

@@ -1,7 +1,5 @@
 """Synthetic runs with known truth, in plain numpy; shares no code with what it judges."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -94,6 +92,17 @@ def _integrated(
         return np.where(t < end, found.sol(np.minimum(t, end))[0], 0.0 if found.t_events[0].size else found.y[0, -1])
 
     return amplitude
+
+
+def solved(acceleration: Callable[[float, float, float], float], x: float, t: F8) -> tuple[F8, F8]:
+    """Return displacement and velocity of a motion from rest at x, with the acceleration as a function of t, x, v."""
+    from scipy.integrate import solve_ivp
+
+    def slope(at: float, state: F8) -> list[float]:
+        return [state[1], acceleration(at, float(state[0]), float(state[1]))]
+
+    found = solve_ivp(slope, (0.0, float(t[-1])), [x, 0.0], "DOP853", t_eval=t, rtol=1e-10, atol=1e-12)
+    return found.y[0], found.y[1]
 
 
 def times(seconds: float, rate_hz: float = 100.0) -> F8:

@@ -1,7 +1,5 @@
 """Wire logs for tests: logs from bytes, records appended one by one, and a disk in memory that fails on request."""
 
-from __future__ import annotations
-
 import errno
 import json
 import math
@@ -10,6 +8,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
+from acquisition.block import Block
 from acquisition.decoders.line_protocol import LineProtocolEncoder
 from storage.wire_log.appending import LogFile, WireLogWriter
 from storage.wire_log.records import Record, RecordKind
@@ -34,6 +33,12 @@ def json_of(record: Record) -> dict[str, Any]:
     """Return the content of a record in JSON."""
     content: dict[str, Any] = json.loads(record.payload)
     return content
+
+
+def bits(block: Block) -> tuple[Any, ...]:
+    """Return the content of a block as what can be compared bit for bit."""
+    columns = (block.t, block.distance, block.flags, block.host_ns, block.velocity)
+    return block.first, *(None if c is None else (c.dtype.str, c.tobytes()) for c in columns)
 
 
 def line(n: int, echo_us: float) -> bytes:

@@ -20,7 +20,7 @@ from platformdirs import user_config_path
 from acquisition.errors import AcquisitionError, FormatError, UnknownFormat
 from acquisition.recordings.reading import READ_DEFAULTS, ReadOptions
 from acquisition.recordings.recording import Format, Recording, Survey, SurveyFormat
-from acquisition.recordings.tables.text import HEAD_BYTES, head_lines, is_text, restated
+from acquisition.recordings.tables.text import HEAD_BYTES, decode, head_lines, is_text, restated
 from acquisition.regular_file import open_regular
 from failure.extensions import entry_points_of, load_entry
 
@@ -180,12 +180,14 @@ def _begins(with_bytes: bytes) -> Callable[[bytes], bool]:
 
 _AS_XLSX = "open it in a spreadsheet and save it as xlsx or CSV"
 _HTML = re.compile(rb"(?:\xef\xbb\xbf)?\s*<(?:!doctype html|html|head|body|table|meta)\b", re.IGNORECASE)
+_JSON = re.compile(rb'\s*(?:\{\s*"|\[\s*[\[{"])')
 _CONTENTS = (
     ("an OpenDocument file", lambda head: b"application/vnd.oasis.opendocument" in head[:200], _AS_CSV),
     ("a TDMS index", _begins(b"TDSh"), "name the .tdms file next to it"),
     ("a parquet file", _begins(b"PAR1"), 'in Python pandas.read_parquet("run.parquet").to_csv("run.csv")'),
     ("XML of Excel 2003", lambda head: b"urn:schemas-microsoft-com:office:spreadsheet" in head, _AS_XLSX),
     ("a web page (HTML)", lambda head: bool(_HTML.match(head)), _AS_XLSX),
+    ("JSON without times", lambda head: bool(_JSON.match(head)), 'save lists, as {"t": [...], "x": [...]}'),
     ("a page (PDF)", _begins(b"%PDF"), _TEXT),
     ("a picture", lambda head: head.startswith((b"\x89PNG", b"\xff\xd8\xff", b"GIF8")), _TEXT),
     (
@@ -217,8 +219,9 @@ _PROGRAMS = {
 
 def foreign_format(path: str, head: bytes) -> UnknownFormat | None:
     """Return the error for a known file that cannot be read, given its first bytes; None for an unknown file."""
+    page = decode(head).encode() if is_text(head) else head
     for title, matches, remedy in _CONTENTS:
-        if matches(head):
+        if matches(page):
             return UnknownFormat(path, f"expected a recording, got {title}", remedy)
     title, remedy = _PROGRAMS.get(PurePath(path).suffix.lower(), ("", ""))
     return UnknownFormat(path, f"expected a recording, got {title}", remedy) if title else None

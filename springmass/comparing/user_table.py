@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from acquisition.recordings.tables.headings import is_uncertainty
 from acquisition.regular_file import open_regular_text
 from pipeline.several.masses import Hooke, hooke
 from springmass.errors import ProgramError
@@ -81,10 +82,7 @@ def read_rows(path: str | os.PathLike[str], what: str) -> tuple[list[str], list[
     return names, rows
 
 
-_COLUMN = re.compile(
-    r"(?P<what>mass|force|load|weight|position|extension|elongation|displacement|length)"
-    r"[\s_(/\[]*(?P<unit>kg|g|mn|n|m|cm|mm)[)\]]?"
-)
+_COLUMN = re.compile(r"(?P<name>.*?[^\W_])[\s_(/\[]+(?P<unit>kg|g|mn|n|m|cm|mm)[)\]]?")
 _SI = {"kg": ("kg", 1.0), "g": ("kg", 1e-3), "n": ("N", 1.0), "mn": ("N", 1e-3)}  # names of columns are in lower case
 _METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 
@@ -92,7 +90,8 @@ _METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 def read_hooke(path: str | os.PathLike[str]) -> Hooke:
     """Return the spring constant of a table of masses or forces with positions or extensions, each with its unit."""
     names, rows = read_rows(path, "table")
-    found = [(name, match["unit"]) for name in names if (match := _COLUMN.fullmatch(name))]
+    matches = [(name, match) for name in names if (match := _COLUMN.fullmatch(name))]
+    found = [(name, match["unit"]) for name, match in matches if not is_uncertainty(match["name"])]
     loads = [(name, *_SI[unit]) for name, unit in found if unit in _SI]
     positions = [(name, _METRES[unit]) for name, unit in found if unit in _METRES]
     if len(loads) != 1 or len(positions) != 1:

@@ -1,7 +1,5 @@
 """The command line called in this process, and recordings to call it on."""
 
-from __future__ import annotations
-
 import json
 import logging
 import os

@@ -1,7 +1,5 @@
 """Tables of a laboratory, a school and an office that are no recordings of an oscillation."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """``springmass analyse``: one line of JSON per input, and exit codes that tell what happened."""
 
-from __future__ import annotations
-
 import io
 import json
 import subprocess
@@ -67,15 +65,6 @@ def test_an_impossible_scene_is_one_line(cli: Cli, recording: Path, tmp_path: Pa
     assert len(done.complaint) < 1000
 
 
-def test_json_writes_no_files(cli: Cli, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Results are files only where a folder for them was named."""
-    here = tmp_path / "here"
-    here.mkdir()
-    monkeypatch.chdir(here)
-    assert cli("analyse", "--json", recording).code == 0
-    assert list(here.iterdir()) == []
-
-
 @pytest.mark.parametrize("count", [1, 2])
 def test_a_folder_that_cannot_be_made_costs_one_line(cli: Cli, recording: Path, count: int) -> None:
     """A file stands where the results should go: the results are printed, one line says so, exit code 2."""
@@ -116,19 +105,6 @@ def test_standard_input_is_read(cli: Cli, data: Path, monkeypatch: pytest.Monkey
     assert result["estimates"] == expected["estimates"]
     monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(b"hello")))
     assert cli("analyse", "-", "--json").complaint.startswith("springmass: <stdin>: ")
-
-
-def test_recordings_and_channels_have_their_own_results(cli: Cli, tmp_path: Path) -> None:
-    """A text keeps its whole name, a run file its stem, and a chosen channel follows; no report replaces another."""
-    t = np.arange(1000) / 100
-    rows = "".join(f"{a:.2f},{0.2 + 0.05 * np.cos(8 * a):.5f},{0.3 + 0.04 * np.cos(9 * a):.5f}\n" for a in t)
-    for name in ("bob.txt", "bob.csv"):
-        (tmp_path / name).write_text(f"time (s),left (m),right (m)\n{rows}")
-    springmass.load(tmp_path / "bob.csv", channel="left").save(tmp_path / "bob.h5")
-    for name, *options in (("bob.txt", "--channel", "left"), ("bob.csv", "--channel", "right"), ("bob.h5",)):
-        assert cli("analyse", tmp_path / name, *options, "-o", tmp_path / "out").code == 0
-    folders = sorted(path.name for path in (tmp_path / "out").iterdir())
-    assert folders == ["bob.csv.right.results", "bob.results", "bob.txt.left.results"]
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """Bad input: one line that names the file and what to do; never a wrong number."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -53,13 +51,6 @@ def analysed(cli: Cli, path: Path) -> Any:
     done = cli("analyse", "--json", path)
     assert (done.code, done.err) == (0, "")
     return done.results[0]
-
-
-def test_a_last_row_cut_inside_its_time_is_left_out_and_told(cli: Cli, write: Write, rows: list[bytes]) -> None:
-    """Its time is unknown, so that it cannot be a missing sample."""
-    result = analysed(cli, write([*rows[:-1], b"9.9"]))
-    assert result["input"]["samples"] == len(rows) - 1
-    assert "truncated_row" in {f["code"] for f in result["findings"]}
 
 
 @pytest.mark.parametrize("start", ["nothing", "header"])

@@ -1,67 +1,32 @@
 """``springmass record`` of boards and adapters as benches have them, on a pseudo-terminal."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 import os
-import pty
 import select
 import threading
-import time
-import tty
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from springmass import load
 from tests.cli.conftest import Cli
-
-T_S = 0.790066
-
-
-def distance_cm(t: float) -> float:
-    """Return where the bob is."""
-    return 26.9 + 5.2 * math.cos(2 * math.pi * t / T_S)
+from tests.faults.conftest import on_a_terminal
 
 
-@contextmanager
-def board(act: Callable[[int, threading.Event], None]) -> Iterator[str]:
-    """Yield the name of a port; ``act`` writes to its other end until the test ends."""
-    master, slave = pty.openpty()
-    tty.setraw(slave)
-    os.set_blocking(master, False)
-    stop = threading.Event()
-    thread = threading.Thread(target=act, args=(master, stop))
-    thread.start()
-    try:
-        yield os.ttyname(slave)
-    finally:
-        stop.set()
-        thread.join()
-        os.close(slave)
-        os.close(master)
-
-
-def send_lines(
-    master: int, stop: threading.Event, rate_hz: float = 50.0, together: int = 1, form: bytes = b"%.2f cm\r\n"
-) -> None:
-    """Send lines at an even rate, some of them together."""
-    start, held, count = time.monotonic(), b"", 0
-    while not stop.wait(max(0.0, start + count / rate_hz - time.monotonic())):
-        held += form % distance_cm(count / rate_hz)
-        count += 1
-        if count % together == 0:
-            with contextlib.suppress(BlockingIOError):
-                os.write(master, held)
-            held = b""
+def line(number: int, form: bytes = b"%.2f cm\r\n") -> bytes:
+    """Return what a board prints of a swing of 0.79 s as its reading of a number, at 100 Hz."""
+    return form % (26.9 + 5.2 * math.cos(math.tau * number / 79.0))
 
 
 def test_lines_that_come_together_are_all_used(cli: Cli, tmp_path: Path) -> None:
-    """Twelve lines every quarter of a second have their own times, a report says so, and T is right."""
-    with board(lambda master, stop: send_lines(master, stop, 50.0, 12)) as port:
+    """Twelve lines every eighth of a second have their own times, and a report says so."""
+
+    def together(number: int) -> bytes:
+        return b"".join(map(line, range(number - 11, number + 1))) if number % 12 == 11 else b""
+
+    with on_a_terminal(together) as port:
         named = ("--port", port, "--sensor", "text-lines", "--seconds", "8")
         done = cli("record", *named, "-o", tmp_path / "run.h5")
     assert done.code == 0, done.err
@@ -71,24 +36,15 @@ def test_lines_that_come_together_are_all_used(cli: Cli, tmp_path: Path) -> None
     assert np.ptp(np.diff(samples.t)) < 1e-6
 
 
-def test_a_board_may_need_a_while_or_a_character(cli: Cli, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("silent", "options"), [(500, {}), (0, {"waits": True})], ids=["a while", "a character"])
+def test_a_board_may_need_a_while_or_a_character(
+    cli: Cli, tmp_path: Path, silent: int, options: dict[str, bool]
+) -> None:
     """One that begins after five seconds of nothing is waited for, and one that waits for a character gets it."""
-
-    def slow(master: int, stop: threading.Event) -> None:
-        if not stop.wait(5.0):
-            send_lines(master, stop)
-
-    def asking(master: int, stop: threading.Event) -> None:
-        os.write(master, b"Send any character to begin\r\n")
-        while not stop.is_set() and not select.select([master], [], [], 0.1)[0]:
-            pass
-        send_lines(master, stop)
-
-    for act, options in ((slow, ()), (asking, ("--send", "x"))):
-        with board(act) as port:
-            named = ("--port", port, "--sensor", "text-lines", "--seconds", "1", *options)
-            done = cli("record", *named, "-o", tmp_path / f"{act.__name__}.h5")
-        assert done.code == 0, done.err
+    with on_a_terminal(lambda number: line(number) if number >= silent else b"", **options) as port:
+        named = ("--port", port, "--sensor", "text-lines", "--seconds", "1", *(("--send", "x") if options else ()))
+        done = cli("record", *named, "-o", tmp_path / "run.h5")
+    assert done.code == 0, done.err
 
 
 def test_another_reader_of_the_port_is_reported(cli: Cli, tmp_path: Path) -> None:
@@ -103,7 +59,7 @@ def test_another_reader_of_the_port_is_reported(cli: Cli, tmp_path: Path) -> Non
                     os.read(descriptor, 64)
         os.close(descriptor)
 
-    with board(send_lines) as port:
+    with on_a_terminal(line) as port:
         reader = threading.Thread(target=other, args=(port,))
         reader.start()
         done = cli("record", "--port", port, "--sensor", "text-lines", "--seconds", "5", "-o", tmp_path / "run.h5")
@@ -116,15 +72,10 @@ def test_another_reader_of_the_port_is_reported(cli: Cli, tmp_path: Path) -> Non
 def test_seven_data_bits_are_named_and_read(cli: Cli, tmp_path: Path) -> None:
     """Text with a parity bit is no noise: the message names the option that reads it."""
 
-    def parity(master: int, stop: threading.Event) -> None:
-        start, count = time.monotonic(), 0
-        while not stop.wait(max(0.0, start + count / 50.0 - time.monotonic())):
-            line = b"%.2f cm\r\n" % distance_cm(count / 50.0)
-            with contextlib.suppress(BlockingIOError):
-                os.write(master, bytes(byte | 0x80 if byte.bit_count() % 2 else byte for byte in line))
-            count += 1
+    def parity(number: int) -> bytes:
+        return bytes(byte | 0x80 if byte.bit_count() % 2 else byte for byte in line(number))
 
-    with board(parity) as port:
+    with on_a_terminal(parity) as port:
         named = ("--port", port, "--sensor", "text-lines", "--seconds", "1", "-o", tmp_path / "run.h5")
         done = cli("record", *named)
         assert (done.code, "--framing 7E1" in done.err) == (4, True)
@@ -134,7 +85,7 @@ def test_seven_data_bits_are_named_and_read(cli: Cli, tmp_path: Path) -> None:
 
 def test_recover_reads_kept_bytes_with_other_options(cli: Cli, tmp_path: Path) -> None:
     """A log that was recorded with a wrong unit is read anew with the right one."""
-    with board(lambda master, stop: send_lines(master, stop, form=b"%.2f\r\n")) as port:
+    with on_a_terminal(lambda number: line(number, b"%.2f\r\n")) as port:
         named = ("--port", port, "--sensor", "text-lines", "--option", "unit=mm", "--seconds", "1")
         assert cli("record", *named, "-o", tmp_path / "run.h5").code == 0
     (tmp_path / "kept").mkdir()

@@ -1,7 +1,5 @@
 """``springmass convert``: an old recording into a run file and back, bit for bit, and nothing overwritten unasked."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -15,26 +13,7 @@ from springmass.loading.scenes import read_scene
 from storage.run_file.reading import open_run
 from storage.run_file.writing import write_run
 from tests.cli.conftest import Cli
-
-
-def same_samples(a: Any, b: Any) -> bool:
-    """Tell whether two blocks hold the same values, bit for bit."""
-    pairs = [(getattr(a, name), getattr(b, name)) for name in ("t", "distance", "flags", "velocity", "host_ns")]
-    return all((x is None) == (y is None) and (x is None or x.tobytes() == y.tobytes()) for x, y in pairs)
-
-
-def test_the_original_comes_back_bit_for_bit(cli: Cli, data: Path, tmp_path: Path) -> None:
-    """Text into a run file, and the text out of it under a name of one's own."""
-    old, run, back = data / "clipped_simulated_position.txt", tmp_path / "run.h5", tmp_path / "back.txt"
-    done = cli("convert", old, run)
-    assert (done.code, done.out) == (0, "")
-    assert done.complaint.startswith(f"{run}: ")
-    assert cli("convert", run, back).code == 0
-    assert back.read_bytes() == old.read_bytes()
-    with open_run(run) as file:
-        file.verify()
-        assert same_samples(file.samples(), springmass.load(old).loaded.samples)
-        assert (file.header.format, file.info.kind) == ("motion-sensor", "simulated")
+from tests.wire import bits
 
 
 def test_a_pair_comes_back_into_a_folder(cli: Cli, data: Path, tmp_path: Path) -> None:
@@ -95,7 +74,7 @@ def test_a_run_file_converts_to_one_that_says_the_same(cli: Cli, data: Path, tmp
     )
     assert cli("convert", first, second, "--scene", data / "undamped.scene.toml").code == 0
     with open_run(first) as a, open_run(second) as b:
-        assert same_samples(a.samples(), b.samples())
+        assert bits(a.samples()) == bits(b.samples())
         assert (a.info, a.header.title, a.traps, a.header.format) == (b.info, b.header.title, b.traps, b.header.format)
         assert a.originals() == b.originals()
         assert dict(b.provenance) | dict(a.provenance) == b.provenance

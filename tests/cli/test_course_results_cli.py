@@ -1,7 +1,5 @@
 """A course's results compared: one spring, one drag coefficient for each disc."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math

@@ -1,7 +1,5 @@
 """``springmass doctor``: an installation that is whole passes, and a package of another distribution is found."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

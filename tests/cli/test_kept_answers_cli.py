@@ -1,7 +1,5 @@
 """What the user states about a file is kept next to it, and every later command reads it."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from pathlib import Path
@@ -78,11 +76,6 @@ def test_an_analysis_keeps_its_answers(cli: Cli, bob: Path) -> None:
     assert sm.load(bob.with_suffix(".h5")).recorded["reading"] == {"unit": "cm", "rate_hz": 100.0}
 
 
-def test_keep_without_answers_is_refused(cli: Cli, bob: Path) -> None:
-    """It would have no effect."""
-    assert cli("analyse", bob, "--keep").code == 2
-
-
 def test_another_channel_takes_the_unit_with_it(cli: Cli, tmp_path: Path) -> None:
     """The unit that was stated belongs to the channel that was stated."""
     path = tmp_path / "two.csv"
@@ -90,11 +83,3 @@ def test_another_channel_takes_the_unit_with_it(cli: Cli, tmp_path: Path) -> Non
     assert cli("scene", path, "--channel", "a", "--unit", "cm").code == 0
     assert cli("analyse", path, "--no-report").code == 0
     assert "--unit" in cli("analyse", path, "--channel", "b", "--no-report").complaint
-
-
-def test_notes_with_an_unknown_answer_are_refused(cli: Cli, bob: Path) -> None:
-    """The line names the file and the key."""
-    bob.with_name("bob.csv.about.toml").write_text("[reading]\nunits = 'cm'\n")
-    done = cli("analyse", bob)
-    assert done.code == 2
-    assert "units" in done.complaint

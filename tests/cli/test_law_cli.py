@@ -1,7 +1,5 @@
 """A damping law on the command line: stated by an option, a scene file or a table of runs."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 
@@ -23,16 +21,10 @@ def run(tmp_path: Path) -> Path:
     return path
 
 
-def scene(folder: Path, law: str) -> Path:
-    """Return a scene file that states a law."""
-    path = folder / "bench.toml"
-    path.write_text(f'[bob]\nmass_kg = 0.2\n[damping]\nlaw = "{law}"\ngamma_per_s = 0.5\n')
-    return path
-
-
 def test_a_law_of_a_scene_file_is_named_first(cli: Cli, run: Path) -> None:
     """The first line of the output names the law; an option takes precedence over the file."""
-    bench = scene(run.parent, "linear")
+    bench = run.with_name("bench.toml")
+    bench.write_text('[bob]\nmass_kg = 0.2\n[damping]\nlaw = "linear"\ngamma_per_s = 0.5\n')
     assert "linear" in cli("analyse", run, "--scene", bench, "--no-report").out.splitlines()[0]
     (free,) = cli("analyse", run, "--scene", bench, "--law", "any", "--json").results
     assert free["damping"]["stated"] is None

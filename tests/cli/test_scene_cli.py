@@ -1,7 +1,5 @@
 """A scene to fill in, checked, given value by value, and noted beside a recording."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import tomllib
@@ -133,7 +131,15 @@ def test_notes_up_to_the_limit_are_read_again(cli: Cli, run: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["marks = 3", "[scene.bob]\nmass_kg = -1", "what = 1", "notes = [", "[[marks]]\nt_s = 'a'"]
+    "text",
+    [
+        "marks = 3",
+        "[scene.bob]\nmass_kg = -1",
+        "what = 1",
+        "notes = [",
+        "[[marks]]\nt_s = 'a'",
+        "[reading]\nunits = 'cm'",
+    ],
 )
 def test_notes_that_cannot_be_read_are_refused(cli: Cli, run: Path, text: str) -> None:
     """One line that names the file; nothing is guessed from half of it."""

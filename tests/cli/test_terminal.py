@@ -1,7 +1,5 @@
 """The program on a pseudo-terminal of 80 columns, as a person sees it."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What every command shares: help, version, and one line for a command line that cannot be."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -25,7 +23,7 @@ def test_every_command_explains_itself(cli: Cli, monkeypatch: pytest.MonkeyPatch
 
 
 def test_the_first_help_is_short_and_quick() -> None:
-    """First what a student, a course and a bench need, a line each; no command is imported for it, and no numpy."""
+    """No command is imported for it, and no numpy; it fits a screen with a line for each command of a student."""
     code = "import sys; from springmass.cli import main; main(['--help']); print('numpy' in sys.modules)"
     environment = {**os.environ, "COLUMNS": "80"}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
@@ -45,11 +43,3 @@ def test_every_finding_is_explained(cli: Cli) -> None:
     wrong = cli("explain", "clip")
     assert (wrong.code, wrong.out) == (2, "")
     assert "clipped" in wrong.complaint
-
-
-@pytest.mark.parametrize("option", ["--unit", "--rate-hz", "--unverified"])
-def test_an_option_of_reading_names_the_way_of_a_command_of_many_files(cli: Cli, option: str) -> None:
-    """What 0.3.0 took as an option is answered with the words to type instead."""
-    done = cli("compare", "a.csv", "b.csv", option, "cm")
-    key = option.removeprefix("--").replace("-", "_")
-    assert (done.code, done.out, f"--read {key}=" in done.err) == (2, "", True)

@@ -1,7 +1,5 @@
 """Every family of rangefinders passes ``springmass.testing``; a new one joins by adding its cases to ``CASES``."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """Every format of recordings passes ``springmass.testing``; a new one joins by adding its cases to ``CASES``."""
 
-from __future__ import annotations
-
 import io
 import json
 import tarfile

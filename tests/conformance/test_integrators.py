@@ -1,7 +1,5 @@
 """Every integrator passes ``springmass.testing`` and errs little against forty digits; limits of growth are ours."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

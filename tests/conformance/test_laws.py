@@ -1,7 +1,5 @@
 """Every damping law passes ``springmass.testing`` and obeys its equation; what is special about ours besides."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

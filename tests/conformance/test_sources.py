@@ -1,7 +1,5 @@
 """The rules that a replay keeps at every speed."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Links of the documentation lead somewhere, and the README's commands do what it shows."""
 
-from __future__ import annotations
-
 import re
 import runpy
 import shutil

@@ -1,7 +1,5 @@
 """The script on the page about many machines gives the same files as one process."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """The notebook of the documentation runs from its first cell to its last, and is stored with what it shows."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

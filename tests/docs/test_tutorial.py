@@ -5,8 +5,6 @@ A ``python`` block is a session with ``>>>`` or plain code. Where a block states
 does, blanks normalised and ``...`` for anything. The blocks of a page share one folder and one namespace.
 """
 
-from __future__ import annotations
-
 import doctest
 import os
 import re

@@ -1,7 +1,5 @@
 """Sensors at the ends of what their frames and a log can hold: sound frames, and numbers that no bench sends."""
 
-from __future__ import annotations
-
 import itertools
 import json
 from collections.abc import Callable, Iterable

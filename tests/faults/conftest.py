@@ -1,11 +1,10 @@
 """A sensor that shares no code with the decoders, a recording of it in a separate process, and a time limit."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import pty
 import resource
+import select
 import signal
 import socket
 import subprocess
@@ -18,7 +17,7 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType, SimpleNamespace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import pytest
@@ -62,11 +61,11 @@ def files_up_to(size: int) -> Iterator[None]:
 
 
 class Sensor:
-    """Writes to a descriptor at a fixed rate, or once for each request, until it is stopped."""
+    """Writes to a descriptor at a fixed rate, or once for each request, until it is stopped; it may wait for a byte."""
 
-    def __init__(self, descriptor: int, send: Send, *, polled: bool) -> None:
+    def __init__(self, descriptor: int, send: Send, *, polled: bool = False, waits: bool = False) -> None:
         os.set_blocking(descriptor, False)
-        self._descriptor, self._send, self._polled = descriptor, send, polled
+        self._descriptor, self._send, self._polled, self._waits = descriptor, send, polled, waits
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run)
         self._thread.start()
@@ -77,6 +76,8 @@ class Sensor:
         self._thread.join()
 
     def _run(self) -> None:
+        while self._waits and not self._stop.is_set():
+            self._waits = not select.select([self._descriptor], [], [], 0.1)[0]
         start, number = time.monotonic(), 0
         while not self._stop.wait(0.002 if self._polled else max(0.0, start + number / RATE_HZ - time.monotonic())):
             with contextlib.suppress(OSError):  # nobody reads: a sensor's bytes are lost then
@@ -86,11 +87,11 @@ class Sensor:
 
 
 @contextmanager
-def on_a_terminal(send: Send, *, polled: bool = False) -> Iterator[str]:
+def on_a_terminal(send: Send, **how: bool) -> Iterator[str]:
     """Yield the name of a port on which a sensor sends."""
     master, slave = pty.openpty()
     tty.setraw(slave)
-    sensor = Sensor(master, send, polled=polled)
+    sensor = Sensor(master, send, **how)
     try:
         yield os.ttyname(slave)
     finally:
@@ -108,7 +109,7 @@ def on_a_socket(send: Send) -> Iterator[str]:
 
         def serve() -> None:
             connection = stack.enter_context(listener.accept()[0])
-            sensors.append(Sensor(connection.fileno(), send, polled=False))
+            sensors.append(Sensor(connection.fileno(), send))
 
         thread = threading.Thread(target=serve)
         thread.start()
@@ -126,7 +127,7 @@ class Feeder:
         self._mute, self._plugged = False, contextlib.ExitStack()
         self.port.symlink_to(self._plugged.enter_context(on_a_terminal(self._line)))
 
-    def __enter__(self) -> Feeder:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -1,7 +1,5 @@
 """A course whose results cannot be written: one line and an exit code, and what can be written is."""
 
-from __future__ import annotations
-
 import errno
 import fcntl
 from pathlib import Path

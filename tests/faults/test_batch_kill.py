@@ -3,8 +3,6 @@
 ``SPRINGMASS_KILLS`` sets the number of trials each way to a twelfth of it, and the course to its whole length.
 """
 
-from __future__ import annotations
-
 import csv
 import os
 import random

@@ -1,7 +1,5 @@
 """A disk that fills up, a file-size limit, short writes: one clear line, and nothing committed is lost."""
 
-from __future__ import annotations
-
 import errno
 from pathlib import Path
 from typing import Any

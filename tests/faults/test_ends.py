@@ -1,7 +1,5 @@
 """Every end of a recording, as docs/reference/ends-of-a-recording.md has them, while every display fails."""
 
-from __future__ import annotations
-
 import contextlib
 import fcntl
 import os

@@ -1,7 +1,5 @@
 """Run files that were changed, and what is no file at all: one line of refusal at once, never a wrong number."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import socket
@@ -89,6 +87,12 @@ def outside(file: Any, folder: Path) -> None:
     file[names[1]] = file[DISTANCE]
 
 
+def zeroed(file: Any, _: Path) -> None:
+    """Have the disk lose a chunk of the distances: zeros have the checksum zero."""
+    chunk = file[DISTANCE].id.get_chunk_info(0)
+    file[DISTANCE].id.write_direct_chunk(chunk.chunk_offset, bytes(chunk.size))
+
+
 def without(name: str) -> Harm:
     """Return a function that takes a name away."""
     return lambda file, _: taken(file, name)
@@ -112,6 +116,7 @@ HARM: dict[str, Harm] = {
     "distances in two rows": put(DISTANCE, lambda values: values.reshape(2, -1)),
     "distances that are words": put(DISTANCE, lambda values: values.astype("S8")),
     "no distances": without(DISTANCE),
+    "a lost chunk of distances": zeroed,
     "no signal": without("/entry/signal"),
     "no header": without(HEADER),
     "an empty header": put(HEADER, lambda _: np.bytes_(b"")),

@@ -4,8 +4,6 @@ The sensors are written here and share no code with the decoders. The seconds of
 read in them is put while a write stands still. ``SPRINGMASS_TRIALS`` asks for all 50.
 """
 
-from __future__ import annotations
-
 import json
 import os
 from collections import defaultdict

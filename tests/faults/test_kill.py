@@ -5,8 +5,6 @@ random moment and finds out from what is left in the pipe how much the child had
 number of trials.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import struct

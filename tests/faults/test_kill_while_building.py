@@ -4,8 +4,6 @@ The child counts the calls that building makes and stops at one of them; there t
 spread over the whole of the work, the last syscalls included. ``SPRINGMASS_KILLS`` raises the number of trials.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

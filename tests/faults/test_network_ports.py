@@ -1,7 +1,5 @@
 """A sensor behind an RFC 2217 server: pyserial's own server before the simulated sensor's port."""
 
-from __future__ import annotations
-
 import contextlib
 import select
 import socket

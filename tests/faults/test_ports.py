@@ -3,8 +3,6 @@
 The wire forms are written here, from the pages of the sensors, and share no code with the decoders.
 """
 
-from __future__ import annotations
-
 import errno
 import grp
 import os

@@ -4,8 +4,6 @@ No process and no plug is needed: a file in memory notes how far it was at each 
 was synced and does what it likes with every page after that. ``SPRINGMASS_KILLS`` sets the number of states.
 """
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass, field
 from pathlib import Path

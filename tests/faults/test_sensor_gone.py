@@ -1,7 +1,5 @@
 """A sensor that is unplugged, falls silent, or is replaced by another. The loss is reported, and the exit code is 4."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import re

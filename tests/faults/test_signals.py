@@ -4,8 +4,6 @@ One child process works again and again and sends itself a signal at a random mo
 moments lie in the work and not in the start of Python. ``SPRINGMASS_TRIALS`` asks for 200 moments of each command.
 """
 
-from __future__ import annotations
-
 import itertools
 import os
 import shutil

@@ -1,7 +1,5 @@
 """The rangefinder's firmware, built and run under an emulator, with what truly happened beside what it said."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from collections.abc import Callable

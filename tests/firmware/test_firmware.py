@@ -1,7 +1,5 @@
 """The rangefinder's firmware, as it runs: times, codes, commands, and what it takes of the processor."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 from collections import Counter

@@ -1,7 +1,5 @@
 """`springmass record` reads the emulated rangefinder's port in real time, as it reads a real one."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

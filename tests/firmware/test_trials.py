@@ -1,7 +1,5 @@
 """What the rangefinder must reach, whole: `SPRINGMASS_TRIALS=20 pytest -m trials tests/firmware`; bounded without."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Firmware, decoder and the page of the protocol say the same: one set of vectors, which stands on that page."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -8,8 +8,6 @@
 To add a command line, write it behind a `$` into a file below `values` and freeze.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import shlex

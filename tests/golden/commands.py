@@ -4,8 +4,6 @@ Only the command line is called, so nothing here holds a module, a class or a st
 because they may be worded anew. A number with an uncertainty is one entry.
 """
 
-from __future__ import annotations
-
 import contextlib
 import csv
 import functools
@@ -55,7 +53,8 @@ def outcome(places: Places, words: list[str]) -> Table:
         fresh = Path(folder)
         filled = places.filled(words, fresh)
         before = set(fresh.rglob("*"))
-        code, out, err = run(filled)
+        with contextlib.chdir(fresh):  # what lands in the working folder is seen as well
+            code, out, err = run(filled)
         table: Table = {"exit": code}
         for path in sorted(set(fresh.rglob("*")) - before):
             if path.is_file():

@@ -7,8 +7,6 @@ share or a weight by 0.02, and a number in units of u by a hundredth; counts and
 a thousandth of u.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator

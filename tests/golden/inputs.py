@@ -7,8 +7,6 @@ folder, ``{fresh}`` for an empty folder, and ``{copies}`` for one with copies of
 four are made when a command line names them.
 """
 
-from __future__ import annotations
-
 import random
 import re
 import shutil
@@ -19,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import tomli_w
 
-from tests.synthetic import F8, LAW_TRUTHS, Truth, times
+from tests.synthetic import F8, LAW_TRUTHS, Truth, solved, times
 from tests.trials.troubles.kinds import KINDS
 from tests.trials.troubles.record import Kind
 
@@ -106,13 +104,14 @@ def _swing(t: F8, amplitude: float, omega: float = 8.3, gamma: float = 0.01) -> 
 
 
 def _pendulum(t: F8) -> F8:
-    """Return the angle of a pendulum of 1 m from 0.9 rad, by a Runge-Kutta method of order 8, rad."""
-    from scipy.integrate import solve_ivp
+    """Return the angle of a pendulum of 1 m from 0.9 rad, rad."""
+    return solved(lambda _, x, v: -9.81 * np.sin(x) - 0.02 * v, 0.9, t)[0]
 
-    def rate(_: float, state: F8) -> list[float]:
-        return [state[1], -9.81 * np.sin(state[0]) - 0.02 * state[1]]
 
-    return np.asarray(solve_ivp(rate, (0.0, float(t[-1])), [0.9, 0.0], "DOP853", t, rtol=1e-10, atol=1e-12).y[0])
+def _saturating(t: F8) -> F8:
+    """Return an angle whose frequency falls with the amplitude up to 0.05 rad, and no further beyond."""
+    amplitude = 0.15 * np.exp(-0.025 * t)
+    return amplitude * np.cos(np.cumsum(7.7 * (1.0 - 0.017 * np.minimum(amplitude / 0.05, 1.0))) / 100.0)
 
 
 _MOTIONS: dict[str, tuple[str, float, Callable[[F8], F8]]] = {
@@ -130,8 +129,13 @@ _MOTIONS: dict[str, tuple[str, float, Callable[[F8], F8]]] = {
     "three-halves": ("distance (m)", 3e-4, Truth(**LAW_TRUTHS["power"]).position),
     "stops": ("distance (m)", 3e-4, Truth(gamma=0.02, mu=1.6e-3).position),
     "short": ("distance (m)", 3e-4, lambda t: 0.3 + _swing(t, 0.05)),
+    "saturating": ("angle (rad)", 3e-4, _saturating),
+    "cubic-drag": ("distance (m)", 2e-5, lambda t: 0.3 + solved(lambda _, x, v: -68.9 * x - 4.0 * v**3, 0.1, t)[0]),
+    "wavering": ("distance (m)", 3e-4, lambda t: 0.3 + (0.05 - 2e-4 * t + 5e-3 * np.sin(0.2 * t)) * np.cos(8.3 * t)),
+    "switch": ("voltage (V)", 0.01, lambda t: np.where(t % 2.0 < 1.0, 1.0, 0.0)),
 }
-_SECONDS = {"short": 2.0, "three-halves": 60.0, "stops": 45.0, "pendulum": 60.0}
+_SECONDS = {"short": 2.0, "stops": 45.0, "saturating": 100.0}
+_SECONDS |= dict.fromkeys(("three-halves", "pendulum", "wavering", "switch"), 60.0)
 
 
 def _motion(path: Path) -> None:
@@ -147,6 +151,11 @@ def _table(head: str, form: str = "{:.2f},{:.3f}") -> str:
     t = times(10.0)
     rows = [form.format(at, value) for at, value in zip(t, 22.0 + _swing(t, 4.0) + _noise(t.size, 0.01), strict=True)]
     return "\n".join([*([head] if head else []), *rows, ""])
+
+
+def _rewritten(head: str, row: Callable[[int, float, str], str]) -> str:
+    rows = (each.split(",") for each in _table("").splitlines())
+    return "\n".join([head, *(row(i, float(t), x) for i, (t, x) in enumerate(rows)), ""])
 
 
 def _only_values(head: str) -> str:
@@ -183,6 +192,10 @@ _ODD: dict[str, Callable[[], str | bytes]] = {
     ),
     "constant.csv": lambda: "time (s),height (cm)\n" + "".join(f"{0.01 * i:.2f},22.5\n" for i in range(500)),
     "three-rows.csv": lambda: "time (s),height (cm)\n0.00,22.1\n0.01,22.3\n0.02,22.2\n",
+    "row-numbers.csv": lambda: _rewritten(
+        "seq_num,time,ranger,setpoint", lambda i, t, x: f"{i},{1.7e9 + t:.2f},{x},0.0"
+    ),
+    "days.csv": lambda: _rewritten("Time,Distance (cm)", lambda _, t, x: f"{0.6096 + t / 86400.0:.12f},{x}"),
     "no-mass.toml": lambda: "[bob]\nmass_kg = -0.2\n",
     "unknown-key.toml": lambda: "[bob]\nmas_kg = 0.2\n",
     "not.toml": lambda: "[bob\n",
@@ -196,6 +209,7 @@ _ODD: dict[str, Callable[[], str | bytes]] = {
     "reported.csv": lambda: (
         "run,name,value,u,unit\ndamped_simulated_position,T,0.79,0.01,s\n"
         "undamped_simulated_position,T,0.790066,0.00002,s\ndamped_simulated_position,k,14.0,0.1,N/m\n"
+        "damped_simulated_position,T,0.9,0.001,s\ndamped_simulated_position,colour,3,,\n"
     ),
     "hooke.csv": lambda: (
         "mass_kg,rest_m\n" + "".join(f"{mass},{0.20 + 9.81 * mass / 14.0:.4f}\n" for mass in (0.1, 0.15, 0.2, 0.25))

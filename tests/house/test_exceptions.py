@@ -1,7 +1,5 @@
 """Every exception of the project survives the way from a worker's process to the one that reports it."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import pickle

@@ -1,7 +1,5 @@
 """The versions that one step of .ci/nightly installs are the smallest that pyproject.toml declares."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 

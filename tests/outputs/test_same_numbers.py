@@ -1,7 +1,5 @@
 """One file gives one set of numbers: on the command line, in Python, in a report, in a course and on the page."""
 
-from __future__ import annotations
-
 import contextlib
 import csv
 import io

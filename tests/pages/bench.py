@@ -1,7 +1,5 @@
 """What tests do on a page: wait for a state, press keys, answer questions, and be a client without a browser."""
 
-from __future__ import annotations
-
 import contextlib
 import http.client
 import json

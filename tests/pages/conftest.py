@@ -1,7 +1,5 @@
 """One browser and one old run's page for all tests of pages; a recording with its page for tests that act on it."""
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import os

@@ -1,7 +1,5 @@
 """What is done at the bench on the page: every step is shown once the recorder has acknowledged it."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """The page of an old run as its user meets it: selections, cursors, play, charts, what is saved."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Clients that break off, send what is none of the page's, or hold connections: few lines, and the page goes on."""
 
-from __future__ import annotations
-
 import contextlib
 import http.client
 import json

@@ -1,7 +1,5 @@
 """The page makes the report of what it shows, and serves it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Reports and the page of a course as readers meet them: on a laptop, a phone and paper, and by a screen reader."""
 
-from __future__ import annotations
-
 import itertools
 import json
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """A technician's session: zero, trigger, marks, reload, report, and the same run again."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from typing import Any

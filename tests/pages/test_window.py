@@ -1,7 +1,5 @@
 """The window as a person meets it who does not type commands: by visible labels alone, with the mouse or the keys."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What tests of the window drop, and how they speak to its server without a browser."""
 
-from __future__ import annotations
-
 import http.client
 import json
 import os

@@ -1,7 +1,5 @@
 """The tests of the package; they need springmass and nothing else, and run as a program or by pytest."""
 
-from __future__ import annotations
-
 import math
 
 import bench_extras

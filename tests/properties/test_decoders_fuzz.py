@@ -4,8 +4,6 @@ What vouches is told by :data:`ORACLES`, which look for frames anywhere in the b
 decoders' code.
 """
 
-from __future__ import annotations
-
 import contextlib
 import math
 import random

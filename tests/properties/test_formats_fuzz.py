@@ -1,7 +1,5 @@
 """Readers under damaged files of the conformance suite: refused in one line or read truly."""
 
-from __future__ import annotations
-
 import re
 from itertools import pairwise
 from typing import Any

@@ -1,7 +1,5 @@
 """What is no oscillation gets no period, of whatever quantity; what oscillates and rests, or beats, is told so."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Callable
 from pathlib import Path
@@ -108,11 +106,3 @@ def test_two_modes_of_equal_strength_are_both_named(ratio: float, quantity: str)
     found = analyse(Track.from_arrays(t, 0.05 * y, unit=UNITS[quantity]))
     expected = sorted([2 * np.pi / 5.0, 2 * np.pi / (5.0 * ratio)])
     assert told_modes(found) == pytest.approx(expected, rel=1e-3)
-
-
-def test_a_clocked_switch_is_not_two_modes() -> None:
-    """Its fundamental and third harmonic keep step."""
-    t = np.arange(3000) / 50.0
-    y = np.where(t % 2.0 < 1.0, 1.0, 0.0) + 0.01 * np.random.default_rng(2).standard_normal(t.size)
-    found = analyse(Track.from_arrays(t, y, unit="V"))
-    assert found.estimates.keys() == {"offset", "noise"}

@@ -1,7 +1,5 @@
 """Numbers of a table are read to the last bit, and a row that is no row leaves its neighbours alone."""
 
-from __future__ import annotations
-
 import tempfile
 from decimal import Decimal
 from pathlib import Path

@@ -5,8 +5,6 @@ locales of CLDR (Babel) write them, and as Python, numpy, pandas, MATLAB, Fortra
 Columns, names and units of other programs stand beside them, and what wraps rows: quotes, comments, a monitor's clock.
 """
 
-from __future__ import annotations
-
 import csv
 import datetime
 import io

@@ -1,7 +1,5 @@
 """Whatever goes into a run file comes out bit for bit, or not at all."""
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -18,6 +16,7 @@ from storage.errors import NotARun, RunDamaged
 from storage.run_file.reading import RunFile, open_run
 from storage.run_file.writing import write_run
 from tests.sampling import sampled
+from tests.wire import bits
 
 # Any bit pattern is a float64: NaN payloads, negative zero and subnormal numbers among them. Those beyond the range
 # that a run file holds become small by their highest bits.
@@ -66,12 +65,6 @@ infos = st.builds(
 )
 traps = st.builds(FormatIssue, texts, texts, st.integers(0, 2**40), st.none() | st.integers(1, 2**40))
 originals = st.builds(Original, texts, st.binary(max_size=40))
-
-
-def bits(block: Block) -> tuple[Any, ...]:
-    """Return a block's content as what can be compared bit for bit."""
-    columns = (block.t, block.distance, block.flags, block.host_ns, block.velocity)
-    return block.first, *(None if c is None else (c.dtype.str, c.tobytes()) for c in columns)
 
 
 @given(

@@ -1,7 +1,5 @@
 """Whatever happens to a wire log, its reader never raises, never invents a record, and tells what is missing."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

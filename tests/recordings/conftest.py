@@ -1,7 +1,5 @@
 """Where the real recordings are, which are never part of the project."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

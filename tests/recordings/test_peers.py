@@ -1,7 +1,5 @@
 """Recordings of other projects, against the results that these publish or print."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 The masses, 200.7 g bare and 217.6 g with a disc of 102 mm, are assumed: they are those of a report on such a bench.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

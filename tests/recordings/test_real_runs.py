@@ -1,7 +1,5 @@
 """Real recordings, where they are at hand, give what was found of them by other means."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path

@@ -1,16 +1,12 @@
 """Dialects met in public: what oscillates has the period that scipy finds; the goldens hold what is read."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.identify import open_recording
-from acquisition.recordings.questions import Missing
 from acquisition.recordings.reading import ReadOptions
 from pipeline.analyse import Analysis, analyse
 from pipeline.track import UNUSABLE
@@ -53,15 +49,6 @@ def only(recordings: Path, start: str) -> Path:
     """Return the one file under wild/ of that name."""
     (path,) = (each for each in (recordings / "wild").iterdir() if each.name.startswith(start))
     return path
-
-
-def test_a_workbook_of_results_is_no_recording(recordings: Path) -> None:
-    """Row numbers are no times: a table of results by hand is answered as such, unless a rate is stated."""
-    with pytest.raises(FormatError, match="not a recording"):
-        open_recording(only(recordings, "xlsx"))
-    with pytest.raises(NeedsAnswer) as caught:
-        open_recording(only(recordings, "xlsx"), ReadOptions(rate_hz=1.0))
-    assert caught.value.question.missing == (Missing.CHANNEL, Missing.UNIT)
 
 
 def analysed(path: Path, given: Given) -> tuple[Analysis, np.ndarray, np.ndarray]:

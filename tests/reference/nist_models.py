@@ -5,8 +5,6 @@ published at itl.nist.gov/div898/strd (public domain), as they travel in the sou
 Rat43 states nine degrees of freedom there; its certified residual standard deviation is that of eleven.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The general fitter on NIST's nonlinear reference data: 27 sets, 54 starts, certified to eleven digits."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

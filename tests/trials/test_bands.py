@@ -3,8 +3,6 @@
 ``SPRINGMASS_TRIALS=1000 pytest -m trials tests/trials/test_bands.py`` solves 1,000 benches of each scene.
 """
 
-from __future__ import annotations
-
 import os
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A second mode is hardly ever found where there is none, and nearly always where there is one."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Iterator

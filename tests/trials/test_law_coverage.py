@@ -5,8 +5,6 @@ docs/explanation/accuracy.md.
 The records are decaying cosines whose amplitude is integrated; no code of the estimators is in it.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Mapping

@@ -3,8 +3,6 @@
 A few benches are always taken, a hundred with the trials.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

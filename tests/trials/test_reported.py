@@ -3,8 +3,6 @@
 One bench is always taken, and all twenty by ``pytest -m "trials or not trials" tests/trials/test_reported.py``.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Stuck bits and interpolated samples: numbers stay within their u, or a warning names the cause."""
 
-from __future__ import annotations
-
 import os
 
 import numpy as np

@@ -1,16 +1,14 @@
 """The period of very small swings of hard and soft springs and of pendulums."""
 
-from __future__ import annotations
-
 import math
 import os
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from pipeline.analyse import analyse
 from pipeline.track import Track
+from tests.synthetic import solved
 from tests.trials.grades.graded import said_of
 
 RECORDS = min(200, int(os.environ.get("SPRINGMASS_TRIALS", "24")))
@@ -26,12 +24,8 @@ def _record(seed: int) -> tuple[Track, float]:
     square = 9.81 / rng.uniform(0.4, 1.2) if pendulum else rng.uniform(40.0, 80.0)
     cubic = rng.uniform(2.0, 40.0) * (1.0 if rng.random() < 0.6 else -0.3)
     start = math.radians(rng.uniform(8.0, 50.0)) if pendulum else rng.uniform(0.03, 0.07)
-
-    def moves(_: float, z: np.ndarray) -> list[float]:
-        pull = math.sin(z[0]) if pendulum else z[0] * (1.0 + cubic * z[0] ** 2)
-        return [z[1], -square * pull - 2.0 * gamma * z[1]]
-
-    x = solve_ivp(moves, (0.0, float(t[-1])), [start, 0.0], t_eval=t, rtol=1e-9, atol=1e-11).y[0]
+    pull = math.sin if pendulum else lambda x: x * (1.0 + cubic * x**2)
+    x, _ = solved(lambda _, x, v: -square * pull(x) - 2.0 * gamma * v, start, t)
     unit, noise = ("rad", 1e-3) if pendulum else ("m", 3e-4)
     track = Track.from_arrays(t, 0.3 + x + noise * rng.standard_normal(t.size), unit=unit)
     return track, math.tau / math.sqrt(square - gamma**2)

@@ -6,8 +6,6 @@ docs/explanation/accuracy.md, with the law stated and without. The recordings ar
 bound.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """The page states correctly how much longer to record."""
 
-from __future__ import annotations
-
 import math
 import os
 from typing import Any

@@ -195,7 +195,8 @@ def prepared(text: Text) -> Text:
 
 def _as_columns(text: Text) -> Text:
     """Return a text of a few long lines, each a quantity, as columns; any other text as it is."""
-    lines = [line for line in text.lines(0, 3 * _MOST_LONG) if line.strip()]
+    filled = [line for line in text.lines(0, 3 * _MOST_LONG) if line.strip()]
+    lines = [line for line in filled if not line.lstrip().startswith(("#", "%"))]
     if not 0 < len(lines) <= _MOST_LONG or len(text) > 3 * _MOST_LONG:
         return text
     plain = [re.sub(r"^\s*\w+\s*=", "", line).strip(" []{};\t") for line in lines]
@@ -207,18 +208,22 @@ def _as_columns(text: Text) -> Text:
         parse_number(cell) is None and not is_time_cell(cell) for cell in numbers
     ):
         return text
-    return Text.of("\n".join(["\t".join(cells) for cells in zip_longest(*rows, fillvalue="")] + [""]).encode())
+    above = [line for line in filled if line not in lines]
+    columns = ["\t".join(cells) for cells in zip_longest(*rows, fillvalue="")]
+    return Text.of("\n".join([*above, *columns, ""]).encode())
 
 
 def _with_units_apart(text: Text) -> Text:
     """Return a text in which the units that cells have behind their numbers are cells of their own."""
     head = [line for line in text.head(_HEAD) if any(char.isdigit() for char in line)]
     mark = next((mark for mark in "\t;," if all(mark in line for line in head[1:])), None)
+    if mark is None and len({pair[1] for line in text.lines() if (pair := quantity(line.strip()))}) > 1:
+        mark = "\t"  # of single cells, each with the unit that suits it
     if mark is None or len(head) < 2 * _FEWEST:
         return text
     with_unit = [[is_quantity(cell.strip(' "')) for cell in line.split(mark)] for line in head[_FEWEST:]]
     apart = {at for at, kinds in enumerate(zip_longest(*with_unit, fillvalue=False)) if np.mean(kinds) >= _SHARE}
-    if not apart or len(apart) == len(with_unit[0]):  # a sketch prints one distance in several units
+    if not apart or 1 < len(apart) == len(with_unit[0]):  # a sketch prints one distance in several units
         return text
     lines = []
     for line in text.lines():

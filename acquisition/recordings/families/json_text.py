@@ -15,8 +15,9 @@ from acquisition.recordings.tables.table import Table
 from acquisition.recordings.tables.text import head_lines, text_of
 
 _FEWEST = 3
-_BEGINS = re.compile(r'\s*(\{\s*"|\[\s*\{\s*")')
+_BEGINS = re.compile(r'\s*(\{\s*"|\[\s*\{\s*"|\[\s*\[\s*[-"\d])')
 _LISTS = re.compile(r'"([^"\n]+)"\s*(?=:\s*[\[{]\s*["\d.-]|[],])')
+_ROWS = re.compile(r"\s*\[\s*\[\s*-?\d")
 _NAMES = re.compile(r'"([^"\n]+)"\s*:')
 _REMEDY = 'save lists of times and values, as {"t": [...], "x": [...]}'
 
@@ -27,7 +28,8 @@ def _evidence(head: bytes) -> str:
     if not _BEGINS.match(text) or ("\n" in text.strip() and first.rstrip().endswith("}")):
         return ""  # a line for each record is read as a sketch's
     names = (_NAMES if re.search(r"\[\s*\{", text) else _LISTS).findall(text)
-    return next((f'it is JSON with "{name}"' for name in names if is_time(heading_of(name)[0])), "")
+    rows = "it is JSON with rows of numbers" if _ROWS.match(text) else ""
+    return next((f'it is JSON with "{name}"' for name in names if is_time(heading_of(name)[0])), rows)
 
 
 def _tables(path: str, data: bytes) -> list[Table]:
@@ -45,21 +47,22 @@ def _tables(path: str, data: bytes) -> list[Table]:
 
 
 def _columns(content: Any, depth: int) -> Iterator[tuple[Sequence[str], Sequence[Sequence[Any]]]]:
-    """Yield names and columns wherever lists of one of the three forms stand."""
+    """Yield names and columns wherever lists of one of the forms stand."""
     if isinstance(content, list) and content and all(isinstance(each, dict) for each in content):
         names = list(dict.fromkeys(name for each in content for name, cell in each.items() if _is_cell(cell)))
         yield names, [[each.get(name, "") for each in content] for name in names]
-    if not isinstance(content, dict) or depth > 8:
+    named = {"": content} if isinstance(content, list) else content
+    if not isinstance(named, dict) or depth > 8:
         return
-    lists = {name: _as_list(each) for name, each in content.items()}
+    lists = {name: _as_list(each) for name, each in named.items()}
     names = [name for name, each in lists.items() if len(each) >= _FEWEST and all(map(_is_cell, each))]
     if len(names) > 1:
         yield names, [lists[name] for name in names]
-    for rows in content.values():
+    for rows in named.values():
         if isinstance(rows, list) and rows and all(isinstance(row, list) and len(row) == len(rows[0]) for row in rows):
             titles = next((each for each in lists.values() if len(each) == len(rows[0]) and each is not rows), [])
             yield [str(each) for each in titles] or [""] * len(rows[0]), list(zip(*rows, strict=True))
-    for each in content.values():
+    for each in named.values() if named is content else ():
         yield from _columns(each, depth + 1)
 
 

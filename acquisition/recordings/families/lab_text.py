@@ -62,8 +62,9 @@ def acqknowledge(lines: Sequence[str]) -> Header | None:
     names = [line.strip() for line in lines[sampling + 2 : at]]
     if step is None or not step[0] > 0 or len(lines) < at + 3:
         return None
-    columns = [cell.strip() for cell in lines[at].split("\t") if cell.strip()]
-    sizes = [cell for cell in lines[at + 1].split("\t") if cell.strip()]
+    mark = next((mark for mark in "\t;," if mark in lines[at]), "\t")
+    columns = [cell.strip() for cell in lines[at].split(mark) if cell.strip()]
+    sizes = [cell for cell in lines[at + 1].split(mark) if cell.strip()]
     counted = bool(sizes) and all(cell.strip().isdecimal() for cell in sizes) and len(set(sizes)) == 1
     channels = [Heading(name, unit) for name, unit in zip(names[::2], names[1::2], strict=True)]
     if len(columns) > len(channels):
@@ -71,7 +72,7 @@ def acqknowledge(lines: Sequence[str]) -> Header | None:
     samples = int(sizes[0]) if counted and parse_number(sizes[0]) else None
     formula = Formula(0.0, step[0], samples) if len(columns) <= int(count[1]) else None
     why = f'line {sampling + 1} is "{lines[sampling].strip()}", as AcqKnowledge writes it'
-    return Header(why, at + 1 + counted, "\t", channels, formula=formula, title=lines[0].strip() if sampling else "")
+    return Header(why, at + 1 + counted, mark, channels, formula=formula, title=lines[0].strip() if sampling else "")
 
 
 LABCHART = text_format("labchart", "LabChart text: each block a run", labchart, blocks=_blocks)

@@ -174,8 +174,9 @@ def unwrapped(values: F8, turns: Iterable[float]) -> tuple[F8, int]:
         if usual < 0.25 * turn and np.abs(np.abs(steps[jumps]) - turn).max() <= 1.5 * usual:
             whole = values.copy()
             whole[finite] -= turn * np.concatenate(([0.0], np.cumsum(np.sign(steps) * jumps)))
-            if np.ptp(whole[finite]) < np.ptp(values[finite]):  # else it turns on and on
-                return whole - turn * round(median(whole[finite]) / turn), int(np.count_nonzero(jumps))
+            count = int(np.count_nonzero(jumps))
+            if np.ptp(whole[finite]) < turn * max(1.0, 0.5 * count):  # else it turns on and on
+                return whole - turn * round(median(whole[finite]) / turn), count
     return values, 0
 
 

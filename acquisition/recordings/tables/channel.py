@@ -105,7 +105,7 @@ def _without_jumps(rows: ChannelRows, column: Column, measured: Measure) -> tupl
     scale = 10.0**measured.power * measured.factor
     printed = rows.value / scale
     whole = not np.nanmax(np.abs(printed - np.rint(printed)), initial=0.0)
-    turns = [2 * math.pi] if measured.quantity == "angle" else [2.0**bits * scale for bits in (16, 32) if whole]
+    turns = [2 * math.pi] if measured.quantity == "angle" else [2.0**bits * scale for bits in range(8, 33) if whole]
     value, count = unwrapped(rows.value, turns)
     if not count:
         return rows, ()

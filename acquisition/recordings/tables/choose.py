@@ -47,6 +47,7 @@ Channel = tuple[Table, Column]
 def choose_channel(path: str, tables: Sequence[Table], answers: ReadOptions) -> Channel:
     """Return the channel to read, in a table with its times, or ask for everything that is missing in one question."""
     if answers == READ_DEFAULTS and not any(_may_be_a_recording(table) for table in tables):
+        _refuse_what_is_no_motion(path, tables[0], tables[0].columns[0])
         raise _no_recording(path, tables[0])
     needs: list[MissingItem] = []
     runs = tuple(dict.fromkeys(table.run for table in tables))
@@ -73,8 +74,7 @@ def choose_channel(path: str, tables: Sequence[Table], answers: ReadOptions) -> 
         column = next((each for each in table.columns if each.name == column.name), column)
     if table.times is not None and table.lines is not None and _restarts(table.times):
         table = replace(table, times=None, formula=None)  # chunks of times, with unknown intervals between them
-    if no_motion := _no_motion(table, column):
-        raise FormatError(path, f"expected a motion, got {no_motion}", "export the data against time")
+    _refuse_what_is_no_motion(path, table, column)
     if answers.time_unit is not None:
         table = _with_time_unit(path, table, answers.time_unit)
     needs.extend(_missing_times(path, [each for _, each in channels], table, column, answers))
@@ -131,16 +131,17 @@ def _candidates(channels: Sequence[Channel]) -> Sequence[Channel]:
     return sorted(fit, key=lambda each: _unlikely(each[1]))
 
 
-def _no_motion(table: Table, column: Column) -> str:
-    """Return what is tabulated if it is no motion: a spectrum or an autocorrelation; empty for a motion."""
-    names = [column.name, table.times.name if table.times is not None else ""]
+def _refuse_what_is_no_motion(path: str, table: Table, column: Column) -> None:
+    """Refuse a spectrum and an autocorrelation."""
+    names, found = [column.name, table.times.name if table.times is not None else ""], ""
     if any(AUTOCORRELATION.search(name) for name in names):
-        return f'the autocorrelation "{" against ".join(filter(None, names))}"'
-    for each in table.beside if not table.is_timed else ():
+        found = f'the autocorrelation "{" against ".join(filter(None, names))}"'
+    for each in (table.beside or table.columns) if not table.is_timed else ():
         rises = np.diff(_some_of(each))
         if (FREQUENCY.search(each.name) or each.unit.lower() in ("hz", "khz")) and rises.size and (rises > 0).all():
-            return f'a spectrum against "{each.label}"'
-    return ""
+            found = f'a spectrum or a resonance curve against "{each.label}"'
+    if found:
+        raise FormatError(path, f"not a recording of a motion, but {found}", "export the data against time")
 
 
 def _may_be_a_recording(table: Table) -> bool:

@@ -334,13 +334,19 @@ def are_named_times(heading: Heading) -> bool:
 def times_by_name(table: Header, columns: Sequence[F8]) -> list[int]:
     """Return the rising columns that are named as times, and the first column if its even steps have a unit of time.
 
-    A column that is named counts as rising if its times can be put in order, or start again.
+    A column that is named counts as rising if its times can be put in order, or start again. No period is zero, so T
+    from zero on in even steps is a time.
     """
     named = [
         column
         for column, each in enumerate(table.headings)
         if are_named_times(each)
-        or (column == 0 and time_unit(each.unit) is not None and not SPAN.search(each.name) and _is_even(columns[0]))
+        or (
+            column == 0
+            and time_unit(each.unit) is not None
+            and (not SPAN.search(each.name) or (each.name == "T" and columns[0][0] == 0.0))
+            and _is_even(columns[0])
+        )
     ]
     return [column for column in named if _may_be_times(columns[column], [row[column] for row in table.rows])]
 

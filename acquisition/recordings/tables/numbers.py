@@ -1,6 +1,6 @@
 """The grammar of numbers: a cell of text as a number, its value as printed, and how many decimals are printed.
 
-1. A number has digits of one script, at most one point or comma, and perhaps an exponent after E, or D of Fortran.
+1. A number has digits of one script, at most one point or comma, and perhaps an exponent after E, D or Q.
 2. :func:`plain` gives signs, digits and exponents of other scripts and languages their ASCII form, for a whole text.
 3. ``(12.3)`` and ``12.3-`` of accounting are negative.
 4. Words for an overload or a lost value, dashes, and numbers from 9e36 on, which instruments send for an overload, are
@@ -30,7 +30,8 @@ NAN_CELL, EMPTY_CELL, UNREAD_CELL = -1, -2, -3
 EXPONENT = 64
 """Added to the number of decimals of the mantissa if a number has an exponent."""
 
-_CELL = re.compile(r"([+-]?(?:\d+[.,]?(\d*)|[.,](\d+)))(?:[eEdD]([+-]?\d{1,3}))?", re.ASCII)
+_CELL = re.compile(r"([+-]?(?:\d+[.,]?(\d*)|[.,](\d+)))(?:[eEdDqQ]([+-]?\d{1,3}))?", re.ASCII)
+_TO_PYTHON = str.maketrans(",dDqQ", ".eeee")
 _ACCOUNTED = re.compile(r"\((\d[\d.,]*)\)|(\d[\d.,]*)-", re.ASCII)
 _NAN = re.compile(r"[+-]?nan", re.IGNORECASE)
 _LOST = re.compile(r"[-+±>]?∞|[-–—−]+|…|\*+|\?+|\.{2,}")
@@ -79,7 +80,7 @@ def cell(text: str) -> tuple[float, int]:
         match = _CELL.fullmatch(text)
     if match is None:
         return math.nan, NAN_CELL if _NAN.fullmatch(text) or is_lost(text) else UNREAD_CELL
-    value = float(text.replace(",", ".").replace("d", "e").replace("D", "e"))
+    value = float(text.translate(_TO_PYTHON))
     if not abs(value) < _OVERLOAD:
         return math.nan, NAN_CELL
     decimals = min(len(match[2] or match[3] or ""), EXPONENT - 1)
@@ -88,7 +89,7 @@ def cell(text: str) -> tuple[float, int]:
 
 def is_lost(text: str) -> bool:
     """Return whether a cell is a word or sign that stands in place of a number."""
-    return text.lower().lstrip("+-><") in LOST or bool(_LOST.fullmatch(text))
+    return "".join(text.lower().split()).lstrip("+-><") in LOST or bool(_LOST.fullmatch(text))
 
 
 def quantity(text: str) -> tuple[str, str] | None:

@@ -23,7 +23,7 @@ _FOREIGN = re.compile(rb"[\x80-\xff]+[\x21-\x7e]?")
 _HANZI = re.compile(rb"(?:[\xb0-\xd7\xa1-\xa3][\xa1-\xfe])+[\x21-\x7e]?")
 """Common Chinese characters in GB 2312; in cp1252 these codes are capitals with accents, which rarely come in pairs."""
 _NUMBER = re.compile(rb"[\s,;]*[-+]?[.,]?\d")
-_LOG = re.compile(rb"^[EWIDV] \(\d{1,10}\) ", re.MULTILINE)
+_LOG = re.compile(rb"^[EWIDV] \([\d:.]{1,12}\) ", re.MULTILINE)
 ZIP_MAGIC = b"PK\x03\x04"
 _PAGE_BYTES = 1 << 16
 _HEAD_SPAN = 1 << 16

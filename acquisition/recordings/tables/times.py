@@ -61,7 +61,7 @@ _DURATION = re.compile(
     r"|p?t?(?:(?P<h2>\d+) ?h(?:\w+)? ?)?(?:(?P<m2>\d+) ?m(?:in\w*)? ?)?(?:(?P<s2>\d+(?:[.,]\d+)?) ?s(?:\w+)?)?)"
 )
 _WRAPS = (
-    *(float(power) * unit for unit in (1.0, 1e-3, 1e-6) for power in (1 << 16, 1 << 31, 1 << 32)),
+    *(float(power) * unit for unit in (1.0, 1e-3, 1e-6) for power in (1 << 16, 1 << 24, 1 << 31, 1 << 32)),
     *(60.0, 3600.0, _DAY_S / 2, _DAY_S),
 )
 _MOST_MOVED = 3
@@ -186,7 +186,9 @@ def clock_times(cells: Sequence[bytes]) -> tuple[F8, I1]:
                 midnights = -(steps > _DAY_S / 2).astype(float)
             days = np.concatenate(([0.0], np.cumsum(midnights)))
         at = at + _DAY_S * (days - days[0])
-        values[filled] = np.round(at - at[-1 if is_newest_first(at) else 0], decimals[filled].max())
+        first = at[-1 if is_newest_first(at) else 0]
+        unpadded = (np.diff(at) < 0).any() and _padded(at, decimals[filled]) is not None
+        values[filled] = np.round(at - (math.floor(first) if unpadded else first), decimals[filled].max())
     return values, decimals
 
 

@@ -20,9 +20,9 @@ def _pattern(text: str) -> re.Pattern[str]:
 # Times
 
 TIME_WORDS = words(
-    "time times t elapsed timestamp datetime seconds sec secs seg millis milliseconds ms msec micros microseconds us "
-    "µs μs usec nanos nanoseconds ns zeit uhrzeit tempo tempi temps tiempo tiempos tijd tid czas čas aika idő zaman "
-    "время 时间 時間 시간 hora heure ora saat الوقت زمان waktu χρόνος"
+    "time times t ts epoch elapsed timestamp datetime seconds sec secs seg millis milliseconds ms msec micros "
+    "microseconds us µs μs usec nanos nanoseconds ns zeit uhrzeit tempo tempi temps tiempo tiempos tijd tid czas čas "
+    "aika idő zaman время 时间 時間 시간 hora heure ora saat الوقت زمان waktu χρόνος"
 )
 BESIDE_TIME = words(
     "axis value stamp data set run latest elapsed relative absolute since start velocity acceleration raw sensor gps "
@@ -92,7 +92,9 @@ UNIT_OF_NAME = (
     (_pattern(r"force|kraft|forza|fuerza"), "N"),
 )
 """What a channel without a unit probably measures: the unit that a question gives as its example."""
-FREQUENCY = _pattern(r"^(freq\w*|frequen[zc]\w*|fréquence|frecuencia|częstotliwość|частота|频率|周波数|f)$")
+FREQUENCY = _pattern(
+    r"^(freq\w*|frequen[zc]\w*|fréquence|frecuencia|częstotliwość|частота|频率|周波数|hz|khz|f|omega|ω)$"
+)
 AUTOCORRELATION = _pattern(r"auto[-_ ]?[ck]orr|korrelation|\blag\b|time shift|zeitversch")
 """Names of a frequency, against which spectra are tabulated, and of autocorrelations and their shifts of time."""
 MOTION = words(
@@ -105,7 +107,8 @@ MOTION = words(
 
 LOST = words(
     "na n/a #n/a #na null none nil inf infinity infinite ol o.l o.l. 0l over overrange overload overflow overld ovld "
-    "ovrflw ovfl under underrange underflow #value! #div/0! #ref! #num! #null! #name? missing invalid lost timeout"
+    "ovrflw ovfl under underrange underflow outofrange #value! #div/0! #ref! #num! #null! #name? missing invalid "
+    "lost timeout"
 )
 """Words in a column of numbers that an instrument or a sheet writes where it has no number."""
 LABEL = words(

@@ -6,7 +6,7 @@ const LABELS = { period: "period", amplitude_now: "amplitude now", spring_consta
 const OF_LAW = new Set(["damping_rate", "quality_factor"]);
 const KINDS = { voltage: "voltage", angle: "angle", acceleration: "acceleration", force: "force", length: "position" };
 const FRESH_S = 2;
-let position, amplitude, phase, spectrum, shown_zero;
+let position, amplitude, phase, spectrum, shown_zero, named = "";
 let frozen = false, fixed = false, window_index = 1, playing = false, play_time = null, play_moment = 0;
 
 function begin_anew() {
@@ -111,8 +111,8 @@ function show_chart(shown, chart) {
 }
 
 // The names of a panel's series under it.
-function name_series(chart) {
-  const names = legendsOf({ panels: [chart.panel] }, isDark(chart.box))[0].map((entry) => {
+function name_series(chart, series = chart.panel.series) {
+  const names = legendsOf({ panels: [{ ...chart.panel, series }] }, isDark(chart.box))[0].map((entry) => {
     const found = item(entry.label), key = element("canvas", "", { width: 24, height: 12 });
     drawKey(key.getContext("2d"), entry, 0, 6, 1);
     found.prepend(key, " ");
@@ -121,17 +121,24 @@ function name_series(chart) {
   $(`${chart.box.id}-names`).replaceChildren(...names);
 }
 
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { if (amplitude) [amplitude, spectrum].forEach(name_series); });
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { if (amplitude) [amplitude, spectrum].forEach((chart) => name_series(chart)), named = ""; dirty = true; });
 
-// The fits are thin lines below the samples, with two points per pixel.
-const LEAST_SWING_PX = 6;
-function draw_fits(plot) {
-  const { min, max } = plot.scales.x;
-  if (motion && motion.fit) draw_fit(plot, motion.fit, Math.max(min, motion.fit.start, motion.fit.moment - 20), Math.min(max, end_time()), ["flagged", 0]);
-  if (region && region.fit && selection) draw_fit(plot, region.fit, Math.max(min, region.fit.start, region.fit.moment - 20), Math.min(max, selection.to), ["other", 0]);
+// What the position shows is named anew only when it changes, not in each frame.
+function name_position(series) {
+  const now = series.map(({ label, line }) => `${label} ${line}`).join();
+  if (now !== named) name_series(position, series);
+  named = now;
 }
 
-function draw_fit(plot, fit, from, to, name) {
+// The fits are thin lines below the samples, with two points per pixel; uPlot has no series of them.
+const LEAST_SWING_PX = 6, FIT = { label: "fit", role: "law", line: true }, REGION = { label: "fit of the selection", role: "other", line: true };
+function draw_fits(plot) {
+  const { min, max } = plot.scales.x;
+  if (motion && motion.fit) draw_fit(plot, motion.fit, Math.max(min, motion.fit.start, motion.fit.moment - 20), Math.min(max, end_time()), FIT);
+  if (region && region.fit && selection) draw_fit(plot, region.fit, Math.max(min, region.fit.start, region.fit.moment - 20), Math.min(max, selection.to), REGION);
+}
+
+function draw_fit(plot, fit, from, to, { role }) {
   const { ctx } = plot, step = (plot.posToVal(1, "x") - plot.posToVal(0, "x")) / 2;
   if (!(to > from) || (2 * Math.PI) / fit.omega < 2 * LEAST_SWING_PX * step) return;
   ctx.save();
@@ -140,7 +147,7 @@ function draw_fit(plot, fit, from, to, name) {
     const y = fit.rest + fit.amplitude * decay(fit.decay, t - fit.moment) * Math.cos(fit.omega * (t - fit.moment) + fit.phase);
     ctx.lineTo(plot.valToPos(t, "x", true), plot.valToPos((y - zero()) * scale(), "y", true));
   }
-  ctx.strokeStyle = lookOf(...name, position.dark).colour;
+  ctx.strokeStyle = lookOf(role, 0, position.dark).colour;
   ctx.lineWidth = devicePixelRatio;
   ctx.stroke();
   ctx.restore();
@@ -187,6 +194,8 @@ function draw() {
     { label: "samples", role: "data", line: dense, x: t, y: y.map(shown) },
     { label: "marks", role: "mark", x: marks.map(([at]) => at), y: marks.map(() => null), why: marks.map(([, text]) => text) },
   ] });
+  const [rest, measured, marked] = position.panel.series;
+  name_position([measured, motion && motion.fit && FIT, region && region.fit && selection && REGION, level !== null && rest, marks.length && marked].filter(Boolean));
   const omega = motion && motion.omega, swing = omega ? (2 * Math.PI) / omega : 1;
   const orbit = all.orbit(end - 3 * swing, end, Math.max(1, Math.round((swing / 40) * run.rate_hz)));
   const x = orbit.map(([p]) => shown(p)), v = orbit.map(([, v_m]) => v_m * k), fastest = Math.max(...v.map(Math.abs)), middle = (Math.max(...x) + Math.min(...x)) / 2;

@@ -5,8 +5,6 @@ The parts are ``kinds --seeds 4``, ``files``, ``recordings``, ``clean --records 
 and real recordings are compared with what release 0.3.0 says of them.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor

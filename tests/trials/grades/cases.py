@@ -1,7 +1,5 @@
 """The files of ``../shared/cases`` that an analysis answers with values, and what their ``want.txt`` says is true."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path

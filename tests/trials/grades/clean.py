@@ -4,8 +4,6 @@ The bars compare with release 0.3.0 on the same records: ``released.npz`` has wh
 the model that finds faults in records without any is timid: values that are right would no longer be sound.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """A real disc run from three starts: what the model calls constant must not depend on where the run begins."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import combinations
 

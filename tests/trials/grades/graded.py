@@ -1,7 +1,5 @@
 """What the program says of a recording: values with their grades, and the codes of its warnings."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

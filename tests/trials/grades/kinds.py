@@ -4,8 +4,6 @@ Each kind is that of a case of ``../shared/cases``; a seed draws rates, sizes an
 truth of a coefficient of a drag that is not there is zero.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -16,7 +14,8 @@ import numpy as np
 from pipeline.analyse import analyse
 from pipeline.bench.scene import Scene
 from pipeline.track import Track
-from tests.trials.grades.graded import F8, Said, Truth, said_of
+from tests.synthetic import F8, solved
+from tests.trials.grades.graded import Said, Truth, said_of
 
 GRAVITY_M_PER_S2 = 9.81
 
@@ -61,18 +60,7 @@ Maker = Callable[[Draw], Trouble]
 NO_DRAG = {"beta": 0.0, "mu": 0.0}
 
 
-def solved(acceleration: Callable[[float, float, float], float], x: float, t: F8) -> tuple[F8, F8]:
-    """Return displacement and velocity of a motion from rest at x, with the acceleration as a function of t, x, v."""
-    from scipy.integrate import solve_ivp
-
-    def slope(at: float, state: F8) -> list[float]:
-        return [state[1], acceleration(at, float(state[0]), float(state[1]))]
-
-    found = solve_ivp(slope, (0.0, float(t[-1])), [x, 0.0], "DOP853", t_eval=t, rtol=1e-10, atol=1e-12)
-    return found.y[0], found.y[1]
-
-
-def swung(draw: Draw, t: F8, degrees: float, length_m: float, gamma: float) -> tuple[F8, F8]:
+def swung(t: F8, degrees: float, length_m: float, gamma: float) -> tuple[F8, F8]:
     """Return angle and angular velocity of a pendulum that is released at rest."""
     square = GRAVITY_M_PER_S2 / length_m
     return solved(lambda _, x, v: -square * math.sin(x) - 2.0 * gamma * v, math.radians(degrees), t)
@@ -85,7 +73,7 @@ def strong_pendulum(draw: Draw) -> Trouble:
     """A pendulum under an eddy-current brake, released from a wide angle."""
     t, length_m, gamma = draw.times(16.0, 25.0, 50.0), draw.near(0.4, 0.1), draw.near(0.3)
     degrees = draw.near(30.0, 0.4)
-    angle, _ = swung(draw, t, degrees, length_m, gamma)
+    angle, _ = swung(t, degrees, length_m, gamma)
     small = math.tau / math.sqrt(GRAVITY_M_PER_S2 / length_m - gamma**2)
     wide = small * (1.0 + math.radians(degrees) ** 2 / 16.0)
     truth = {"amplitude": math.radians(degrees), "period": (small, wide), "period_small_swings": small}
@@ -187,7 +175,7 @@ def magnitude(draw: Draw) -> Trouble:
 def radial_acceleration(draw: Draw) -> Trouble:
     """A phone on a pendulum, whose axis along the string is tilted a little."""
     t, degrees, tilt = draw.times(40.0, 50.0, 100.0), draw.near(12.0), math.radians(draw.near(3.0))
-    angle, speed = swung(draw, t, degrees, 1.0, 0.004)
+    angle, speed = swung(t, degrees, 1.0, 0.004)
     y = (GRAVITY_M_PER_S2 * np.cos(angle) + speed**2) * math.cos(tilt) + draw.noise(t, 0.005)
     small = math.tau / math.sqrt(GRAVITY_M_PER_S2)
     wide = small * (1.0 + math.radians(degrees) ** 2 / 16.0)
@@ -198,7 +186,7 @@ def radial_acceleration(draw: Draw) -> Trouble:
 def magnet_pendulum(draw: Draw) -> Trouble:
     """A magnet on a pendulum over a magnetometer: one pulse at each passage."""
     t, degrees = draw.times(30.0, 50.0, 100.0), draw.near(12.0)
-    angle, _ = swung(draw, t, degrees, 1.0, 0.006)
+    angle, _ = swung(t, degrees, 1.0, 0.006)
     x = np.sin(angle) - draw.near(0.02)
     y = 200.0 + 300.0 / (1.0 + (x / 0.15) ** 2) ** 1.5 + draw.noise(t, 0.5)
     small = math.tau / math.sqrt(GRAVITY_M_PER_S2)
@@ -300,7 +288,7 @@ def frame_rate(draw: Draw) -> Trouble:
 def pendulum_position(draw: Draw) -> Trouble:
     """The horizontal position of a pendulum that swings wide."""
     t = draw.times(60.0, 30.0)
-    angle, _ = swung(draw, t, draw.near(25.0, 0.4), 1.0, 0.004)
+    angle, _ = swung(t, draw.near(25.0, 0.4), 1.0, 0.004)
     truth = {"period_small_swings": math.tau / math.sqrt(GRAVITY_M_PER_S2), "gravity": GRAVITY_M_PER_S2}
     scene = {"pendulum": {"length_m": {"value": 1.0, "u": 1e-3}}}
     return Trouble(t=t, y=np.sin(angle) + draw.noise(t, 5e-4), truth=truth, scene=scene)
@@ -309,7 +297,7 @@ def pendulum_position(draw: Draw) -> Trouble:
 def pendulum_gyro(draw: Draw) -> Trouble:
     """The angular velocity of a pendulum that swings wide."""
     t = draw.times(60.0, 30.0, 100.0)
-    _, speed = swung(draw, t, draw.near(35.0, 0.3), 1.0, 0.004)
+    _, speed = swung(t, draw.near(35.0, 0.3), 1.0, 0.004)
     truth = {"period_small_swings": math.tau / math.sqrt(GRAVITY_M_PER_S2), "gravity": GRAVITY_M_PER_S2}
     scene = {"pendulum": {"length_m": {"value": 1.0, "u": 1e-4}}}
     return Trouble(t=t, y=speed + draw.noise(t, 3e-3), truth=truth, unit="rad/s", scene=scene)

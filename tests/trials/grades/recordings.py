@@ -4,8 +4,6 @@ The command lines are those of the goldens. A mass is stated, so that a recordin
 ``released.txt`` has what 0.3.0 calls sound, one recording a line.
 """
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A value that is called sound is right where one model does not describe the motion, and stays sound where it does."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable
 

@@ -3,8 +3,6 @@
 ``python -m tests.trials.troubles --seeds 8 --tier standard``; ends with exit code 1 where a limit is not met.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import warnings

@@ -4,8 +4,6 @@ No finding excuses a wrong number here. The motions are closed forms, or solved 
 bob; the sensor may average samples, and its clock or the speed of sound may be off by what the track states.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The verdict on a record: are its numbers right within their uncertainties, and if not, is the trouble named."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

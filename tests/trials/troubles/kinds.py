@@ -1,7 +1,5 @@
 """Every kind of trouble, and the records without any."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

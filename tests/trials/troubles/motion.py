@@ -5,8 +5,6 @@ motion is read off the solution's own turning points: the amplitude is how far t
 damping rate how fast that falls, the period what lies between them. So an error of the steps is no error of the truth.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

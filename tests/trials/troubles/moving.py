@@ -1,7 +1,5 @@
 """Troubles of the motion: the hand at start and end, another law than the fit's, a bench that is not still."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """What a trial is made of: a record with its truth, the kind of trouble in it, and the findings that name that kind."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Troubles of the rows: echoes of something else, lost and repeated rows, wrong times, wrong units, wrong files."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Troubles of a sensor: it cuts off, smooths, holds, counts in steps, hums, mistakes its echoes."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The table of the trials: a line for each kind, and what all of them come to."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

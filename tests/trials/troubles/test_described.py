@@ -3,8 +3,6 @@
 ``SPRINGMASS_TRIALS=20 pytest -m trials tests/trials/troubles/test_described.py`` for twenty records of each kind.
 """
 
-from __future__ import annotations
-
 import math
 import os
 

@@ -1,7 +1,5 @@
 """Records that benches really give: a number is right within its uncertainty, or a warning names what is wrong."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

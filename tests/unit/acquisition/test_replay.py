@@ -1,7 +1,5 @@
 """Blocks, and their replay at its pace, from any second and in a loop, all without waiting."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -41,19 +39,6 @@ def test_a_loop_has_a_gap_before_each_further_turn() -> None:
         np.testing.assert_array_equal(block.distance, whole.distance)
         assert block.flags[0] == (Flag.GAP_BEFORE if block.first else 0)
         assert not block.flags[1:].any()
-
-
-def test_flag_values_are_those_of_the_run_file() -> None:
-    """The bits are written to files and may not move."""
-    assert {flag.name: flag.value for flag in Flag} == {
-        "MISSING": 1,
-        "FALSE_ECHO": 2,
-        "CLIPPED": 4,
-        "DUPLICATE_TIME": 8,
-        "NON_MONOTONIC_TIME": 16,
-        "MALFORMED": 32,
-        "GAP_BEFORE": 64,
-    }
 
 
 def test_slices_and_joins_keep_the_quantity_and_two_are_not_joined() -> None:

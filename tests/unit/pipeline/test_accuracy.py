@@ -1,7 +1,5 @@
 """Each tier keeps its promises: findings on dirty records, the same answer at any origin and scale, deep noise."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The whole line: against another fitter, on what does not oscillate, and on whatever arrays there are."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The mean of (estimate - truth)/u over many records: what no single record shows, a slow drift of a number."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

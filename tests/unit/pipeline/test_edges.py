@@ -1,7 +1,5 @@
 """Records on which a single fit of the whole is wrong: gaps, lost rows and wide swings; truth from closed forms."""
 
-from __future__ import annotations
-
 import itertools
 import math
 
@@ -13,6 +11,7 @@ from pipeline.analysis import Analysis
 from pipeline.bench.scene import Scene
 from pipeline.track import Track
 from tests.sampling import sampled
+from tests.synthetic import solved
 
 NOISES, RATES, GAPS = (1e-4, 3e-4, 2e-3), (50, 100), (0.05, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 30.0)
 
@@ -92,14 +91,8 @@ def test_lost_rows_are_named_and_covered(seed: int, rate: int) -> None:
 )
 def test_a_wide_pendulum(quadratic: float, degrees: int) -> None:
     """The equation of motion is solved by scipy; nobody touches the bob, and the pivot is fixed."""
-    from scipy.integrate import solve_ivp
-
     t, square, start = np.arange(3000) / 50, (2.0 * math.pi / 1.2) ** 2, math.radians(degrees)
-
-    def moves(_: float, z: np.ndarray) -> list[float]:
-        return [z[1], -square * math.sin(z[0]) - quadratic * z[1] * abs(z[1]) - 0.002 * z[1]]
-
-    angle = solve_ivp(moves, (0.0, 60.0), [start, 0.0], t_eval=t, rtol=1e-10, atol=1e-12).y[0]
+    angle, _ = solved(lambda _, x, v: -square * math.sin(x) - quadratic * v * abs(v) - 0.002 * v, start, t)
     angle += math.radians(0.1) * np.random.default_rng(degrees).standard_normal(t.size)
     step = math.radians(0.25)
     scene = Scene(pendulum_length_m=(9.81 / square, 1e-6))
@@ -148,23 +141,3 @@ def test_steps_as_large_as_the_motion_are_part_of_the_uncertainties(step: float)
             assert "no_law_fits" not in codes(analysis)
     assert len(pulls) >= 4
     assert np.quantile(pulls, 0.9, axis=0).max() < 2.8
-
-
-@pytest.mark.parametrize("speed_m_per_s", [-0.03, 0.06])
-def test_a_rest_position_that_moves_shifts_no_period(speed_m_per_s: float) -> None:
-    """Two gliders that drift along a track give the period, and their residuals are noise."""
-    t = np.arange(600) / 50.0
-    y = 0.9 + speed_m_per_s * t + 0.05 * np.exp(-0.01 * t) * np.cos(math.tau * t / 0.79)
-    analysis = analyse(Track.from_arrays(t, y + 5e-4 * np.random.default_rng(1).standard_normal(t.size)))
-    assert abs(pulled(analysis, 0.79)) < 3.0
-    assert codes(analysis, "warning") == {"rest_drift"}
-
-
-def test_fewer_than_two_samples_a_period_at_uneven_times_give_the_period() -> None:
-    """No test of harmonics needs more."""
-    rng = np.random.default_rng(1)
-    t = np.sort(rng.uniform(0.0, 200.0, 300))
-    y = 0.3 + 0.05 * np.exp(-0.004 * t) * np.cos(math.tau * t / 0.8) + 2e-4 * rng.standard_normal(t.size)
-    analysis = analyse(Track.from_arrays(t, y))
-    assert abs(pulled(analysis, 0.8)) < 3.0
-    assert codes(analysis, "warning") == set()

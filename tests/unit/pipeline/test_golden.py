@@ -3,8 +3,6 @@
 One test or more for each mistake on docs/tutorial-report.md, in the report's order.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

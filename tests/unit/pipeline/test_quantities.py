@@ -1,9 +1,6 @@
 """Angles, voltages, accelerations and forces through the whole analysis: their own units, and what needs a length."""
 
-from __future__ import annotations
-
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +9,6 @@ from acquisition.block import UNITS
 from pipeline.analyse import analyse
 from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError, TrackError
-from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import classic
 from pipeline.several.compare import SpringRun
 from pipeline.track import Track
@@ -108,26 +104,6 @@ def test_a_derivative_gives_the_displacement_and_what_follows_from_it(order: int
         mine, its = by_derivative.estimates[name], by_length.estimates[name]
         assert mine.unit == its.unit
         assert abs(mine.value - its.value) < 3.0 * np.hypot(mine.u, its.u), name
-
-
-def test_what_a_scene_allows_of_an_angle_a_voltage_and_a_force() -> None:
-    """A spring constant needs mass and period, of an angle also a spring; Re, energy and drag need a displacement."""
-    spring = replace(SCENE, spring_mass_kg=Estimate(0.01, 1e-4, "kg"))
-    for quantity, scene, known in (
-        ("angle", SCENE, False),
-        ("angle", spring, True),
-        ("voltage", SCENE, True),
-        ("force", SCENE, True),
-    ):
-        found = analyse(track(UNITS[quantity]), scene)
-        assert ("spring_constant" in found.estimates) == known
-        if known:
-            assert (
-                found.estimates["spring_constant"].value == analyse(track(), scene).estimates["spring_constant"].value
-            )
-        for name in ("reynolds_number", "keulegan_carpenter_number", "drag_coefficient", "displacement_amplitude"):
-            assert name not in found.estimates
-        assert ("velocity_rms" in found.estimates) == (quantity == "angle")
 
 
 def test_what_needs_a_length_says_so_in_one_line() -> None:

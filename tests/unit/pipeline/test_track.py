@@ -1,7 +1,5 @@
 """A track is made of anything array-like, or refused in one line."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -12,6 +10,8 @@ from hypothesis import strategies as st
 from pipeline.errors import PipelineError, TrackError
 from pipeline.track import Track
 
+RISING = {"t": [0.0, 1.0], "y": [0.0, 1.0]}
+
 
 @pytest.mark.parametrize(
     "arguments",
@@ -20,13 +20,14 @@ from pipeline.track import Track
         {"t": [[0.0, 1.0]], "y": [[0.0, 1.0]]},
         {"t": 0.0, "y": 0.0},
         {"t": [], "y": []},
-        {"t": [0.0, 1.0], "y": [0.0, 1.0], "flags": [0]},
+        {**RISING, "flags": [0]},
         {"t": [1.0, 0.0], "y": [0.0, 1.0]},
         {"t": [np.nan, np.nan], "y": [0.0, 1.0]},
+        *({**RISING, name: x} for name in ("sigma_m", "quantum_m", "rate_hz") for x in (0.0, -1e-3, np.nan, np.inf)),
     ],
 )
-def test_arrays_that_make_no_track_are_refused_in_one_line(arguments: dict[str, Any]) -> None:
-    """Shapes that differ, too few samples, times that never increase."""
+def test_what_makes_no_track_is_refused_in_one_line(arguments: dict[str, Any]) -> None:
+    """Shapes that differ, too few samples, times that never increase, a noise, a step or a rate that cannot be."""
     with pytest.raises(TrackError) as raised:
         Track.from_arrays(**arguments)
     assert "\n" not in str(raised.value)

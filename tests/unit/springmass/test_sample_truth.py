@@ -1,7 +1,5 @@
 """The simulated recordings are reproducible, and each truth lies within three of its stated uncertainties."""
 
-from __future__ import annotations
-
 import json
 import re
 import sys
@@ -105,13 +103,6 @@ def test_clipped_run() -> None:
     assert run.result.samples.plateaus == (pytest.approx(run.truth["clip_limit_m"], abs=2e-4),)
     assert run.share_flagged("clipped_rows", Quality.CLIPPED) >= 0.98
     assert run.result.quality["clipped"] <= 1.02 * len(run.truth["clipped_rows"])
-
-
-def test_no_error_and_no_false_alarm(run: Sample) -> None:
-    """What the simulation does not hold is not found: no drift, no bend, no misfit."""
-    codes = {finding.code for finding in run.result.findings}
-    assert not codes & {"rest_drift", "amplitude_dependent_frequency", "model_misfit", "no_oscillation", "quantised"}
-    assert "error" not in {finding.severity for finding in run.result.findings}
 
 
 def test_generator_shares_no_code_with_the_project() -> None:

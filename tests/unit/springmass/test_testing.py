@@ -1,7 +1,5 @@
 """What an author may get wrong is found, in one line that says what to do."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

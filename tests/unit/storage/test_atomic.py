@@ -1,14 +1,12 @@
 """Files are written whole or not at all."""
 
-from __future__ import annotations
-
 import os
 import threading
 from pathlib import Path
 
 import pytest
 
-from storage.atomic import whole_file, whole_folder, write_whole
+from storage.atomic import whole_file, write_whole
 from storage.errors import RunExists, WriteFailed
 
 
@@ -50,22 +48,6 @@ def test_a_pipe_or_device_is_not_replaced(tmp_path: Path) -> None:
     with pytest.raises(WriteFailed, match="choose the name of a file"):
         write_whole(path, "text")
     assert path.is_fifo()
-    assert list(tmp_path.iterdir()) == [path]
-
-
-@pytest.mark.parametrize("error", [ValueError("in the middle"), KeyboardInterrupt()])
-def test_a_failing_body_leaves_the_old_state(tmp_path: Path, error: BaseException) -> None:
-    """Whatever the body raises passes through, the temporary file goes and the old content stands."""
-    path = write_whole(tmp_path / "a", "old")
-
-    def half() -> None:
-        with whole_file(path) as temporary:
-            temporary.write_text("half")
-            raise error
-
-    with pytest.raises(type(error)):
-        half()
-    assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
 
 
@@ -137,34 +119,3 @@ def test_two_writers_of_a_file_come_one_after_the_other(tmp_path: Path) -> None:
         temporary.write_text("first")
     thread.join(60)
     assert {each.name: each.read_text() for each in tmp_path.iterdir()} == {"a": "second"}
-
-
-NAMES = {"page", "table", "old", "figures/a"}
-
-
-def held(folder: Path) -> dict[str, str]:
-    """Return what a folder holds, hidden things beside it among them."""
-    every = [*folder.rglob("*"), *folder.parent.glob(".*")]
-    return {os.path.relpath(each, folder): each.read_text() for each in every if each.is_file()}
-
-
-def make(folder: Path, content: str) -> None:
-    """Write a result whole."""
-    with whole_folder(folder, NAMES, "page") as part:
-        (part / "table").write_text(content)
-        (part / "page").write_text(content)
-
-
-@pytest.mark.parametrize("inside", [False, True])
-def test_what_others_put_there_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, inside: bool) -> None:
-    """A folder with other files, or that somebody stands in, keeps its place and its files; stale ones of ours go."""
-    folder = tmp_path / "mine"
-    make(folder, "1")
-    (folder / "old").write_text("1")
-    if inside:
-        monkeypatch.chdir(folder)
-        folder = Path()
-    else:
-        (folder / "notes.txt").write_text("mine")
-    make(folder, "2")
-    assert held(folder.resolve()) == {"page": "2", "table": "2"} | ({} if inside else {"notes.txt": "mine"})

@@ -1,19 +1,14 @@
 """The recorder: the reading thread never waits, and what is not recorded is told."""
 
-from __future__ import annotations
-
 import errno
-from pathlib import Path
 
 import pytest
 
 from acquisition.clock import VirtualClock
-from acquisition.events import Lost, StoredEvent
-from acquisition.live.reader import Sink
+from acquisition.events import StoredEvent
 from storage.errors import WriteFailed
 from storage.recorder import Recorder
 from storage.wire_log.records import LogHeader, RecordKind, SensorEntry
-from storage.wire_log.scanning import read_log
 from tests.wire import WAIT_S, Disk, json_of, parse_log
 
 HEADER = LogHeader(sensors=(SensorEntry(0, "line"), SensorEntry(1, "line")), mono_ns=0, unix_ns=0)
@@ -25,28 +20,6 @@ def recorder(disk: Disk, *, sync_every_s: float = HOUR_S, queue_bytes: int = 1 <
     return Recorder(
         "run.wire", HEADER, VirtualClock(7), sync_every_s=sync_every_s, queue_bytes=queue_bytes, open_file=disk
     )
-
-
-def test_everything_put_is_in_the_log_in_order(tmp_path: Path) -> None:
-    """Data of several channels, marks and events come back in the order they were put, then the end."""
-    with Recorder(tmp_path / "run.wire", HEADER, VirtualClock(7)) as recording:
-        sink: Sink = recording
-        for number in range(500):
-            recording.reads([(number % 2, number, b"R%04d\r" % number)])
-        sink.reads([(1, 500, b"last")])
-        recording.mark("let go")
-        recording.mark("stopped", host_ns=9)
-        sink.event(1, 501, Lost(why="unplugged"))
-    whole = list(read_log(tmp_path / "run.wire"))
-    records = [record for record in whole if record.kind is not RecordKind.HEADER]
-    data = [(record.channel, record.mono_ns, record.payload) for record in records[:501]]
-    assert data == [(n % 2, n, b"R%04d\r" % n) for n in range(500)] + [(1, 500, b"last")]
-    reported = [(record.kind, record.channel, record.mono_ns, record.payload) for record in records[501:503]]
-    assert reported == [(RecordKind.MARK, 0, 7, b"let go"), (RecordKind.MARK, 0, 9, b"stopped")]
-    assert json_of(records[503]) == {"kind": "lost", "facts": {"why": "unplugged"}}
-    assert (records[504].kind, len(records)) == (RecordKind.END, 505)
-    assert json_of(records[504]) == {"records": len(whole) - 1, "dropped_records": 0, "dropped_bytes": 0}
-    assert read_log(tmp_path / "run.wire").damage.intact
 
 
 def test_a_slow_sync_holds_up_no_write() -> None:

@@ -1,7 +1,5 @@
 """Families of sensors: how bytes are recognised, what options are refused, and what single frames mean."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The line protocol is what its page of the reference says."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Lines as sketches print them: the distance that is in them, or what the user is asked."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What boards send besides plain lines: other ends, colours, encodings, clocks that turn, several sensors, frames."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Calibration: a bob at rest, a ruler, and the speed of sound that can be applied again."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

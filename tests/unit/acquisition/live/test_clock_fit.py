@@ -1,7 +1,5 @@
 """The rate of the device's clock against the host's, and what stalls, bursts and restarts do to it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Lines without a clock of their own get times from their arrivals, and every one of them is used."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

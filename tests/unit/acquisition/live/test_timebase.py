@@ -1,7 +1,5 @@
 """Sensor time from the device's clock, its counter or the host."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

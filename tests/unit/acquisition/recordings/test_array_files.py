@@ -1,7 +1,5 @@
 """Arrays, JSON, sound and text of other programs: a file in, samples out; what is no recording is named."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -95,6 +93,7 @@ FORMS: dict[str, Any] = {
     "texts": [{name: str(value) for name, value in each.items()} for each in RECORDS],
     "inside": {"device": {"name": "a"}, "data": {"samples": RECORDS}},
     "rows under names": {"columns": ["time_s", "x_cm"], "data": np.c_[T, X].tolist()},
+    "pairs": np.c_[T, X].tolist(),
     "by index": {"time_s": dict(enumerate(T.tolist())), "x_cm": dict(enumerate(X.tolist()))},
 }
 
@@ -105,7 +104,7 @@ def test_json_is_read_like_a_table(tmp_path: Path, form: str, indent: int | None
     """Lists of times and values, or a list of records, in one line or in many."""
     path = tmp_path / "run.json"
     path.write_text(json.dumps(FORMS[form], indent=indent))
-    holds(open_recording(path))
+    holds(open_recording(path, ReadOptions.of({"unit": "cm"} if form == "pairs" else {})))
 
 
 def test_sound_is_plain_numbers(tmp_path: Path) -> None:
@@ -148,12 +147,14 @@ def test_labchart_text_that_ends_early_is_refused(tmp_path: Path, text: str) -> 
         open_recording(path)
 
 
+@pytest.mark.parametrize("mark", ["\t", ","])
 @pytest.mark.parametrize("step", ["50 msec/sample", "0.05 sec/sample"])
-def test_text_of_acqknowledge(tmp_path: Path, step: str) -> None:
+def test_text_of_acqknowledge(tmp_path: Path, step: str, mark: str) -> None:
     """The numbers of samples above the rows are no row."""
-    head = f"bob.acq\n{step}\n2 channels\nDistance\ncm\nForce\nN\nCH1\tCH2\t\n{N_ROWS}\t{N_ROWS}\t\n"
+    head = f"bob.acq\n{step}\n2 channels\nDistance\ncm\nForce\nN\n"
+    rows = ["CH1\tCH2\t", f"{N_ROWS}\t{N_ROWS}\t", *(f"{x:.3f}\t{x / 7:.4f}\t" for x in X), ""]
     path = tmp_path / "run.txt"
-    path.write_text(head + "".join(f"{x:.3f}\t{x / 7:.4f}\t\n" for x in X))
+    path.write_text(head + "\n".join(rows).replace("\t", mark))
     holds(open_recording(path))
 
 
@@ -176,10 +177,13 @@ PAGE = b"<html><body><table><tr><td>0.0</td><td>1.0</td></tr></table></body></ht
 EXCEL_2003 = b'<?xml version="1.0"?><Workbook xmlns="urn:schemas-microsoft-com:office:spreadsheet"/>'
 NAMED: dict[str, tuple[str, bytes, str]] = {
     "web page": ("a.xls", PAGE, "spreadsheet"),
+    "web page of two bytes a letter": ("a.xls", PAGE.decode().encode("utf-16"), "spreadsheet"),
     "Excel 2003": ("a.xls", EXCEL_2003, "xlsx"),
     "parquet": ("a.parquet", b"PAR1" + bytes(100), "parquet"),
     "formulas": ("a.xlsx", formulas(), "formulas without values"),
     "spectrum": ("a.csv", two_columns("Frequency (Hz),Magnitude (m)"), "spectrum"),
+    "spectrum with short names": ("a.csv", two_columns("freq,mag"), "spectrum"),
+    "spectrum without a name": ("a.csv", two_columns("Hz,PSD"), "spectrum"),
     "autocorrelation": ("a.csv", two_columns("Time shift (s),Autocorrelation of sum"), "autocorrelation"),
     "turning points": ("a.csv", two_columns("t (s),x (cm)", 8 * (-0.99) ** np.arange(T.size)), "turning points"),
 }
@@ -200,5 +204,5 @@ def test_json_without_times_is_no_recording(tmp_path: Path) -> None:
     """Settings and results in a folder are not taken for recordings."""
     path = tmp_path / "settings.json"
     path.write_text(json.dumps({"name": "a", "rows": [1, 2, 3, 4]}, indent=1))
-    with pytest.raises(FormatError, match="no format recognises it"):
+    with pytest.raises(FormatError, match="JSON without times"):
         open_recording(path)

@@ -1,7 +1,5 @@
 """What real files of each family do that a careless reader takes at face value, one by one."""
 
-from __future__ import annotations
-
 import io
 from itertools import pairwise
 from pathlib import Path

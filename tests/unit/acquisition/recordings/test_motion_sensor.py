@@ -1,7 +1,5 @@
 """The MotionSensor.vi reader: every variant seen, and every way a file can be bad."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What a recording leaves out is asked as data: every choice can be taken, and nobody has to read the sentence."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

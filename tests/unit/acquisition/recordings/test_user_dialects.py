@@ -1,7 +1,5 @@
 """Dialects that a user declares in TOML."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Workbooks and archives: what cells, sheets and files inside become, and what is refused before it is unpacked."""
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np

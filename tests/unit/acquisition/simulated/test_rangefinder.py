@@ -1,7 +1,5 @@
 """The simulated rangefinder: its false echoes have the size and the places that it is set to."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

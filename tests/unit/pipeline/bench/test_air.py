@@ -1,7 +1,5 @@
 """Humid air against published tables."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

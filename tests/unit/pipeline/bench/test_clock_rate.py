@@ -1,7 +1,5 @@
 """Clock of a sensor: what a comparison of clocks changes, and what it cannot."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """A scene says what is at the bench; what it may not say is refused by file, key, value and what is allowed."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What a sensor's filter does to an oscillation, against scipy's filters, and that analyses undo it."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

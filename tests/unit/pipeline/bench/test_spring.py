@@ -1,7 +1,5 @@
 """The part of a spring that oscillates with its load."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

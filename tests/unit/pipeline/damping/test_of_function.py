@@ -1,7 +1,5 @@
 """Laws made of functions: they fit as the laws with a class do, and what is no law of damping is refused."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,74 +1,27 @@
-"""A stated law: by it alone results are stated, and the recording may contradict it."""
-
-from __future__ import annotations
+"""A stated law, by which alone results are stated, and limits of what is not determined."""
 
 import numpy as np
 import pytest
 
-from pipeline.analyse import Analysis, analyse
+from pipeline.analyse import analyse
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import UpperLimit
-from pipeline.track import F8, Track
-
-T = np.arange(6000) / 100.0
-
-
-def recorded(amplitude: F8, noise_m: float = 3.5e-4, seed: int = 3) -> Track:
-    """Return 60 s of an oscillation of this amplitude."""
-    noise = noise_m * np.random.default_rng(seed).standard_normal(T.size)
-    return Track.from_arrays(T, 0.2 + amplitude * np.cos(8.3 * T) + noise)
-
-
-def codes_of(analysis: Analysis) -> set[str]:
-    """Return the codes of what affects a run's results."""
-    return {finding.code for finding in analysis.findings if finding.severity != "info"}
-
-
-LINEAR = recorded(0.05 * np.exp(-0.0105 * T))
-QUADRATIC = recorded(0.05 / (1.0 + 0.45 * 0.05 * T))
+from pipeline.track import Track
 
 
 def test_the_law_of_the_scene_is_the_stated_one() -> None:
     """Its coefficients stay out: the rate is that of the recording, by the law alone, and every law is fitted."""
     scene = Scene.from_mapping({"damping": {"law": "linear", "gamma_per_s": 0.9}})
-    analysis = analyse(LINEAR, scene)
+    t = np.arange(6000) / 100.0
+    y = 0.2 + 0.05 * np.exp(-0.0105 * t) * np.cos(8.3 * t) + 3.5e-4 * np.random.default_rng(3).standard_normal(t.size)
+    analysis = analyse(Track.from_arrays(t, y), scene)
     damping, derived = analysis.damping, analysis.derived
     assert (damping.selected, damping.admissible, damping.stated) == ("linear", ("linear",), "linear")
     assert derived.law == "linear"
     assert len(damping.fits) > 5
     assert analysis.estimates["damping_rate"].value == pytest.approx(0.0105, rel=0.05)
     assert derived.coefficients["gamma"].value == pytest.approx(analysis.estimates["damping_rate"].value, rel=1e-9)
-    assert not codes_of(analysis)
-
-
-def test_a_recording_may_contradict_the_stated_law() -> None:
-    """A warning names the law that fits; the numbers stay those of the stated one."""
-    analysis = analyse(QUADRATIC, Scene(damping_law="friction"))
-    assert analysis.damping.selected == "friction"
-    assert "stated_law_rejected" in codes_of(analysis)
-    (finding,) = (finding for finding in analysis.findings if finding.code == "stated_law_rejected")
-    assert finding.values["bic_excess"] > 10.0
-
-
-def test_where_no_law_fits_the_stated_one_is_not_charged_alone() -> None:
-    """An amplitude that no law makes gives no_law_fits, with the nearest law, whichever was stated."""
-    analysis = analyse(recorded(0.05 * (1.0 - 0.004 * T + 0.1 * np.sin(0.2 * T))), Scene(damping_law="quadratic"))
-    assert analysis.damping.best.rejected
-    assert "no_law_fits" in codes_of(analysis)
-    assert "stated_law_rejected" not in codes_of(analysis)
-
-
-def test_coefficients_that_are_not_determined_are_upper_limits() -> None:
-    """Of ten noisy periods neither drag is determined; both keep value and u, which the limit exceeds."""
-    t = T[:800]
-    y = 0.2 + 0.05 * np.exp(-0.003 * t) * np.cos(8.3 * t)
-    analysis = analyse(Track.from_arrays(t, y + 2e-3 * np.random.default_rng(5).standard_normal(t.size)))
-    coefficients = analysis.derived.coefficients
-    assert set(coefficients) == {"gamma", "beta"}
-    for x in coefficients.values():
-        assert isinstance(x, UpperLimit)
-        assert x.u > abs(x.value)
-        assert x.limit > max(x.value, 0.0)
+    assert {finding.severity for finding in analysis.findings} <= {"info"}
 
 
 @pytest.mark.parametrize("ratio", [0.0, 0.3, 1.0, 2.0])

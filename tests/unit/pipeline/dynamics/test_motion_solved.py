@@ -1,7 +1,5 @@
 """The equation of motion, and what a scene makes of it."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,5 @@
 """Findings that name what a scene leaves out."""
 
-from __future__ import annotations
-
-import math
 from dataclasses import replace
 
 import pytest
@@ -32,12 +29,3 @@ def test_inputs_without_uncertainty_are_named(tables: dict[str, object], named: 
     findings = analyse(track, Scene.from_mapping(tables)).findings
     messages = [finding.message for finding in findings if finding.code == "uncertainty_missing"]
     assert [message.rpartition(": ")[2].rstrip(".") for message in messages] == ([named] if named else [])
-
-
-@pytest.mark.parametrize(("length_m", "asked"), [(0.2193, False), (0.5, True)])
-def test_a_gravity_that_is_not_the_earths_asks_about_the_length(length_m: float, asked: bool) -> None:
-    """The result of a length that was mistyped is not sound, and the finding says why."""
-    t = times(20.0)
-    angle = Track.from_arrays(t, noisy(Truth(omega=math.sqrt(9.81 / 0.2193)), t, 3e-4, 1), unit="rad")
-    findings = analyse(angle, Scene(pendulum_length_m=(length_m, 1e-4))).findings
-    assert (("scene_implausible", "warning") in {(each.code, each.severity) for each in findings}) == asked

@@ -1,7 +1,5 @@
 """Strong drag and friction by the equation of motion, compared with the trials' own integration of it."""
 
-from __future__ import annotations
-
 import math
 import os
 from dataclasses import replace
@@ -9,7 +7,6 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from pipeline.analyse import Analysis, analyse
 from pipeline.bench.scene import Scene
@@ -105,19 +102,6 @@ def test_false_echoes_leave_the_fit() -> None:
     assert abs(k.value - OMEGA**2 * MASS) < 3.0 * k.u
     assert k.u < 3e-4 * k.value
     assert result.quality["false_echo"] >= 0.9 * np.count_nonzero(echoes)
-
-
-def test_a_motion_of_another_equation_is_not_forced_into_this_one() -> None:
-    """A record whose drag grows with the cube of speed keeps the averaged law, and says that no solution follows it."""
-
-    def moves(_: float, s: np.ndarray) -> list[float]:
-        return [s[1], -(OMEGA**2) * s[0] - 4.0 * s[1] ** 3]
-
-    run = solve_ivp(moves, (0.0, T[-1]), [START, 0.0], "DOP853", T, rtol=1e-10, atol=1e-13)
-    y = 0.3 + run.y[0] + 2e-5 * np.random.default_rng(2).standard_normal(T.size)
-    codes = {finding.code for finding in analyse(Track.from_arrays(T, y), SPRING).findings}
-    assert "strongly_damped" not in codes
-    assert "not_converged" in codes
 
 
 def test_what_swings_up_and_stops_is_no_drag_that_drives() -> None:

@@ -1,7 +1,5 @@
 """A pendulum of a stated length: the period of very small swings and g, from whatever is recorded of it."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -22,7 +20,7 @@ T = np.arange(1800) / 30.0
 def test_small_swings_and_gravity_are_covered_up_to_sixty_degrees(degrees: float, unit: str, sigma: float) -> None:
     """Of an angle, an angular velocity and a horizontal position; no line asks for a mass."""
     draw = Draw(unit, int(degrees))
-    angle, speed = swung(draw, T, degrees, 1.0, 0.004)
+    angle, speed = swung(T, degrees, 1.0, 0.004)
     y = {"m": np.sin(angle), "rad": angle, "rad/s": speed}[unit] + sigma * draw.rng.standard_normal(T.size)
     found = analyse(Track.from_arrays(T, y, unit=unit), LENGTH).estimates
     for name, truth in (("period_small_swings", SMALL_S), ("gravity", 9.81)):

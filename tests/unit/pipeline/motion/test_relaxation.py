@@ -1,13 +1,9 @@
 """Relaxation motions give their rates; what only looks like one is not taken for one."""
 
-from __future__ import annotations
-
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from pipeline.analyse import analyse
@@ -67,18 +63,3 @@ def test_the_spring_constant_is_that_of_the_undamped_motion(ratio: float) -> Non
     k = result.estimates["spring_constant"]
     assert k.value == pytest.approx(0.2 * OMEGA**2, abs=4.0 * k.u)
     assert ("strongly_damped" in {f.code for f in result.findings}) == (ratio > 0.05)
-
-
-def test_the_amplitude_at_the_start_is_that_of_the_first_sample() -> None:
-    """A pendulum let go at 30 degrees, whose frequency no linear solution follows, keeps its first swing."""
-
-    def moves(_: float, s: np.ndarray) -> list[float]:
-        return [s[1], -24.5 * math.sin(s[0]) - 0.6 * s[1]]
-
-    t = np.arange(400) / 25.0
-    y = solve_ivp(moves, (0.0, t[-1]), [math.radians(30.0), 0.0], "DOP853", t, rtol=1e-9, atol=1e-12).y[0]
-    y += math.radians(0.1) * np.random.default_rng(1).standard_normal(t.size)
-    found = analyse(replace(Track.from_arrays(t, y), unit="rad"))
-    amplitude = found.estimates["amplitude"]
-    assert found.oscillation.start_s == 0.0
-    assert abs(amplitude.value - math.radians(30.0)) < 4.0 * amplitude.u < 0.05

@@ -1,7 +1,5 @@
 """Numbers are printed to the digits that their uncertainties allow."""
 
-from __future__ import annotations
-
 import re
 
 from hypothesis import assume, example, given

@@ -1,7 +1,5 @@
 """Linear algebra keeps to one thread inside an analysis, and only there."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """Values keep uncertainty, correlation and unit in arithmetic, numpy, ``uncertainties``, copies and other processes."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 import math

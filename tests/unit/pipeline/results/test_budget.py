@@ -1,7 +1,5 @@
 """Uncertainty budgets of analysed runs against closed forms written out by hand, and against Monte Carlo (JCGM 101)."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import cache

@@ -1,7 +1,5 @@
 """The report's method is reproduced to the digit, bias and all, against plain numpy and scipy."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The region of two parameters of a damping law, against another program's."""
 
-from __future__ import annotations
-
 import lmfit
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The effects table lists every effect, in or out, with sizes calculated by hand."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """Several runs agree on one spring, or it is said which two were exchanged."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The band of a scene's uncertainties: against linear propagation, and refused."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

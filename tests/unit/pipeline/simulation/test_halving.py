@@ -1,7 +1,5 @@
 """Step halving: the stated error covers the true one, and what cannot be solved or stated is refused with a reason."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -12,8 +10,6 @@ from pipeline.simulation import Equation, Problem, get_integrator
 from pipeline.simulation.halving import auto, halved, solved_once
 from tests.conformance.test_integrators import STEP, STORED, problem_of
 from tests.sampling import sampled
-
-MIXED = Problem(Equation.from_laws(8.66, gamma_per_s=0.0073, beta_per_m_s=0.235), 0.05)
 
 
 @pytest.mark.parametrize("tolerance", sampled([1e-9, 1e-3], 1))
@@ -54,15 +50,6 @@ def test_friction_leaves_no_estimate_where_turning_points_are_not_located(name: 
     assert solution.no_estimate
     with pytest.raises(DynamicsError):
         halved(problem, integrator, 0.001, 100, 1e-3)
-
-
-def test_auto_takes_the_exact_flow_of_a_linear_scene_else_strang() -> None:
-    """Each keeps the tolerance that is asked for."""
-    linear = Problem(Equation(angular_frequency_per_s=8.66, gamma_per_s=0.01), 0.05)
-    assert auto(linear, 0.01, 1000, 1e-12).integrator.name == "exact"
-    assert auto(MIXED, 0.01, 1000, 1e-8).integrator.name == "strang"
-    cubic = Problem(Equation(angular_frequency_per_s=1.0, cubic_per_m2_s2=1.0), 1.0)
-    assert auto(cubic, 0.1, 200, 1e-8).integrator.name == "strang"
 
 
 def test_a_tolerance_out_of_reach_is_refused() -> None:

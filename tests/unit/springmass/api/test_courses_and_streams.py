@@ -1,7 +1,5 @@
 """Many runs in one table, estimates while samples arrive, and every recording in xarray."""
 
-from __future__ import annotations
-
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Errors have one root and say what to do; messages go to ``logging``."""
 
-from __future__ import annotations
-
 import logging
 import shutil
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Sources of blocks, live and replayed through one interface, and simulations as the command makes them."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A script of a user: a type checker finds what is mistyped, and only what is needed is imported."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

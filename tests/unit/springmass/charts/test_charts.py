@@ -1,7 +1,5 @@
 """The numbers of every chart, as a browser gets them, are those of the analysis."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

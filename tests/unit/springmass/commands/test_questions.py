@@ -1,7 +1,5 @@
 """A question is worded for who asked: the call in Python, or the command line with what was given already."""
 
-from __future__ import annotations
-
 import shlex
 from pathlib import Path
 

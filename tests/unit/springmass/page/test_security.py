@@ -1,7 +1,5 @@
 """Nobody but whoever started the page sees it."""
 
-from __future__ import annotations
-
 import asyncio
 import re
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """What the page is sent is what the log holds."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from pathlib import Path
@@ -12,7 +10,7 @@ import pytest
 import springmass
 from acquisition.block import Block, SourceInfo
 from acquisition.clock import VirtualClock
-from acquisition.events import RunEnded, TimedOut, Triggered, Zeroed
+from acquisition.events import RunEnded, Triggered, Zeroed
 from pipeline.track import Track
 from springmass.loading.options import AnalysisOptions
 from springmass.page.feeds import LogFeed, view_of
@@ -29,31 +27,6 @@ def track_of(feed: LogFeed) -> Track:
     """Return the samples so far as the page analyses them."""
     t, distance, flags, host_ns = feed.view.series[0][:]
     return feed.view.live_run(Block(0, t, distance, flags, host_ns), FAST).loaded.track
-
-
-def test_a_log_is_seen_as_it_grows(tmp_path: Path) -> None:
-    """Samples, marks at the record's own times, and what befell the recording; ended once the log is."""
-    header = LogHeader(sensors=(SensorEntry(0, "maxbotix-hr"),), mono_ns=0, unix_ns=0, kind="live", title="bob")
-    with Recorder(tmp_path / "run.wire", header, VirtualClock()) as recorder:
-        feed = LogFeed(tmp_path / "run.wire")
-        for number in range(50):
-            recorder.reads([(0, number * 100_000_000, b"R%04d\r" % (300 + number))])
-        recorder.mark("released", host_ns=2_000_000_000)
-        recorder.event(0, 2_500_000_000, TimedOut(after_s=1.0))
-        recorder.drain()
-        feed.poll()
-        assert (feed.view.source, feed.view.title) == ("LIVE", "bob")
-        seen = len(feed.view.series[0])
-        assert seen >= 48
-        ((moment, text),) = feed.view.marks
-        assert text == "released"
-        assert moment == pytest.approx(2.0, abs=0.2)
-        assert list(feed.view.notes) == ["timeout: after s 1"]
-        assert not feed.view.ended
-    feed.poll()
-    assert feed.view.ended
-    assert feed.view.error == ""
-    feed.close()
 
 
 def test_the_fit_decays_as_its_law() -> None:

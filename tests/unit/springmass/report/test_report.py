@@ -1,7 +1,5 @@
 """The report of a run: its files, the numbers in them, and what must never stand in its page."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re
@@ -178,18 +176,6 @@ def test_table_1_says_what_may_be_quoted(page: str, tmp_path: Path) -> None:
     assert {grades[name] for name in ("amplitude at the start", "rest position")} == {"sound"}
     reasons = next(x for x in re.findall(r"k \(([^)]*)\)", assumed) if "assumed" in x)
     assert "mass of the spring" in reasons
-
-
-def test_an_average_over_amplitudes_is_uncertain_where_they_differ_much(tmp_path: Path) -> None:
-    """The first swings are 14 % faster than the last: the period holds for none of them, that of small swings does."""
-    t = np.arange(6000) / 100
-    size = 0.06 * np.exp(-0.03 * t)
-    phase = np.cumsum(8.3 * (1.0 + 40.0 * size**2)) / 100
-    y = 0.3 + size * np.cos(phase) + 3e-4 * np.random.default_rng(1).standard_normal(t.size)
-    page = (reported(table(tmp_path / "run.csv", y, "Position (m)"), tmp_path) / "report.html").read_text("utf-8")
-    grades = grades_in(page)
-    assert {grades[name] for name in ("period", "frequency", "angular frequency")} == {"uncertain"}
-    assert {grades[name] for name in ("period of very small swings", "amplitude at the start")} == {"sound"}
 
 
 def test_a_phone_has_no_echoes_no_rest_position_and_no_velocity_chart(tmp_path: Path) -> None:

@@ -1,7 +1,5 @@
 """The analysis of a recording that still grows: the numbers of its run file, with bounded cost and memory."""
 
-from __future__ import annotations
-
 import tracemalloc
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A run in a notebook: values by name, summaries, figures, frames and datasets; nothing is lost on the way."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What was read is recorded first and decoded after, and no read goes astray between the two."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """Table 1 on a pipe and on terminals of several widths."""
 
-from __future__ import annotations
-
 import pytest
 
 from pipeline.numerics.estimate import Estimate

@@ -1,7 +1,5 @@
 """A sensor that comes back begins a new part: another channel of the log, another run file."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Events come back from a log and from its run file as they were written, whether this version knows them or not."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import asdict
 from pathlib import Path

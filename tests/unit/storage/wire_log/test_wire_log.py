@@ -1,7 +1,5 @@
 """The wire log: its layout, its header, what is no record of it, and how it is read while it grows."""
 
-from __future__ import annotations
-
 import struct
 import zlib
 from pathlib import Path
