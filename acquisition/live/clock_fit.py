@@ -78,7 +78,7 @@ class ClockSamples:
         return fit_clock(*self._times[:])
 
 
-def fit_clock(t: F8, host_ns: I8, step_s: float = 0.0) -> ClockFit:
+def fit_clock(t: F8, host_ns: I8, *, step_s: float = 0.0) -> ClockFit:
     """Fit a line to the (n,) host times as a function of the sensor times in s, and return the comparison of clocks.
 
     The sensor times are those of the pings: times of reflection vary with the position of the bob.

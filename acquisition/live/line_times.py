@@ -247,7 +247,7 @@ class _Even(NamedTuple):
         steps, cost = (np.arange(gaps.shape[0]), 0.0) if counted else _with_losses(reads, at, gaps)
         x = (steps - steps[0])[reads.last]
         step_s = float(at[-1] - at[0]) / float(x[-1] - x[0])
-        fit = fit_clock(step_s * x, np.rint(at / NANO).astype(np.int64), step_s)
+        fit = fit_clock(step_s * x, np.rint(at / NANO).astype(np.int64), step_s=step_s)
         if not math.isfinite(fit.u_rate_error_ppm):
             return None
         step_s, u_ppm = _unlocked(step_s / (1.0 + 1e-6 * fit.rate_error_ppm), fit.u_rate_error_ppm, at, x)
