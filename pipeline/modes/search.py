@@ -41,13 +41,16 @@ HIGHEST_MODE = 3.4
 LONGEST_SEARCH = 4096
 
 
-def find_modes(samples: Samples, windows: Windows) -> Modes:
+def find_modes(samples: Samples, windows: Windows, known: F8 | float = 0.0) -> Modes:
     """Search for lines beside the main oscillation.
 
     The main oscillation is first removed as smooth curves through the windows' values. Then it is fitted together with
     each line by least squares, with slowly varying amplitude and phase, to block means over a twelfth of a period.
     A mode within a few reciprocals of the record's length of the main frequency is not searched for. It beats too
     slowly to be distinguished from a change of the amplitude.
+
+    Samples far from the main oscillation are left out. ``known`` (n,) is the position of modes that an earlier search
+    found, m: without it, the first swings of a mode that falls quickly would be left out too.
     """
     used = windows.used
     t = samples.track.t[used]
@@ -57,11 +60,12 @@ def find_modes(samples: Samples, windows: Windows) -> Modes:
     if float(t[-1] - t[0]) > LONGEST_SEARCH * turn:
         return Modes(samples)
     carrier = Carrier.through(windows, float(t[0]), float(t[-1]))
-    residual = samples.track.y[used] - carrier.position(t)
-    spread = mad_sigma(residual)
+    residual = samples.track.y - carrier.position(samples.track.t)
+    left, residual = (residual - known)[used], residual[used]
+    spread = mad_sigma(left)
     if spread == 0.0:
         return Modes(samples, carrier=carrier)
-    believed = np.abs(residual) <= 8.0 * spread
+    believed = np.abs(left) <= 8.0 * spread
     blocks = Blocks.of(t[believed], residual[believed], turn / 12.0, samples.track.rate_hz)
     band = _band(carrier, blocks)
     multiples = tuple(turns * carrier.angular_frequency / (2.0 * math.pi) for turns in HARMONICS)
@@ -173,22 +177,24 @@ class _Search:
     def free(self, peak: Peak) -> tuple[Mode, F8]:
         """Refine a peak's frequency, decide whether it decays, and choose the degree of its envelope.
 
-        Frequency and decay come from Gauss-Newton steps with columns w and :math:`\\tau w`. The ratio of the second
-        column's complex coefficient to the first's is :math:`-\\delta + 2\\pi i\\,\\Delta f`.
+        Frequency and decay come from Gauss-Newton steps with columns w and :math:`\\tau w`. Here w falls with the decay
+        so far, and :math:`\\tau` counts from the centre of its energy, so that the two are orthogonal. The ratio of the
+        second column's complex coefficient to the first's is :math:`-\\Delta\\delta + 2\\pi i\\,\\Delta f`.
         """
         unit = peak.density * self.blocks.samples
         f, rate, u_rate = peak.frequency_hz, 0.0, math.inf
         tau = self.blocks.t - 0.5 * self.blocks.seconds
-        longest = 0.5 / self.blocks.seconds
-        for _ in range(4):
-            angle = 2.0 * math.pi * f * tau
-            pair = np.stack([np.cos(angle), -np.sin(angle)]) * self.blocks.weight
-            values, cofactors, _ = self.fit(np.concatenate([pair, pair * tau]).T)
+        longest = math.pi / self.blocks.seconds
+        for _ in range(ROUNDS):
+            angle, fall = 2.0 * math.pi * f * tau, np.exp(-rate * tau) * self.blocks.weight
+            pair = np.stack([np.cos(angle), -np.sin(angle)]) * fall
+            late = tau - float(np.average(tau, weights=fall**2))
+            values, cofactors, _ = self.fit(np.concatenate([pair, pair * late]).T)
             z, slope = values.view(np.complex128).tolist()
-            ratio = slope / z
-            rate, u_rate = -ratio.real, math.sqrt(max(cofactors[2, 2] * unit, 0.0)) / abs(z)
-            step = min(max(ratio.imag / (2.0 * math.pi), -longest), longest)
-            f += step
+            step = slope / z
+            step *= longest / max(longest, abs(step))
+            f, rate = f + step.imag / (2.0 * math.pi), rate - step.real
+            u_rate = math.sqrt(max(cofactors[2, 2] * unit, 0.0)) / abs(z)
             if abs(step) < 2e-3 * longest:
                 break
         # A varying mode has a wider spectrum, which must not overlap the variations of the main oscillation.

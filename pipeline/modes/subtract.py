@@ -25,12 +25,12 @@ def separate(samples: Samples, windows: Windows, *, sought: bool = True) -> tupl
     leak = _leak(modes)
     if not modes.members or not leak > NEGLIGIBLE * _u_amplitude(windows):
         return windows, replace(modes, leak=leak)
-    for again in (False, True):
-        if again and (cleaner := find_modes(samples, windows)).members:
-            # Windows fitted without the modes separate false echoes from the main oscillation better.
-            modes = cleaner
-        subtracted = modes.position(samples.track.t)
-        windows = demodulate(samples.less(subtracted), windows.cycles)
+    subtracted = modes.position(samples.track.t)
+    windows = demodulate(samples.less(subtracted), windows.cycles)
+    # Windows fitted without the modes separate false echoes from the main oscillation better.
+    if (cleaner := find_modes(samples, windows, subtracted)).members:
+        modes, subtracted = cleaner, cleaner.position(samples.track.t)
+    windows = demodulate(samples.less(subtracted), windows.cycles)
     return windows, replace(modes, samples=samples.less(subtracted), subtracted=subtracted, leak=leak)
 
 

@@ -23,6 +23,7 @@ from pipeline.numerics.levels import (
     NOTICEABLE,
     OUTLIER,
     ROUNDS,
+    SIGNIFICANT,
 )
 from pipeline.numerics.regression import correlation_length
 from pipeline.numerics.robust import median
@@ -177,9 +178,9 @@ class DecayingLines:
         """Return whether these are several oscillations, and not one that changes or is no sinusoid.
 
         Each is at least a tenth of the strongest, lasts for several periods and does not grow, none is a multiple of
-        another. Within a bin there are only two that fall alike; others imitate a frequency that changes.
+        another. Within a bin there are only two, whose frequencies differ significantly and whose rates do not; others
+        imitate a frequency that changes.
         """
-        alike = abs(float(np.ptp(self.rates))) < 2.0 * math.sqrt(float(np.sum(np.diag(self.covariance)[4::4])))
         omegas, rates, u = np.sort(self.omegas), self.rates, np.sqrt(np.diag(self.covariance)[4::4])
         ratios, bins = omegas[1:] / omegas[0], np.diff(omegas) * self.record.seconds / math.tau
         beside = np.abs(ratios - np.round(ratios)) * omegas[0] * self.record.seconds < math.tau
@@ -189,8 +190,14 @@ class DecayingLines:
             and np.all(lasting)
             and np.min(self.sizes) > NEGLIGIBLE * np.max(self.sizes)
             and not np.any(beside & (np.round(ratios) > 1.0))
-            and (np.min(bins) >= 1.0 or (omegas.size == 2 and alike))
+            and (np.min(bins) >= 1.0 or (omegas.size == 2 and self._differs(3) and not self._differs(4)))
         )
+
+    def _differs(self, number: int) -> bool:
+        """Return whether the parameter of a number of the first line differs significantly from the second one's."""
+        weights = np.zeros(self.values.size)
+        weights[[number, number + 4]] = -1.0, 1.0
+        return abs(float(weights @ self.values)) > SIGNIFICANT * math.sqrt(weights @ self.covariance @ weights)
 
     def listed(self, unit: str) -> str:
         """Return frequencies and amplitudes at the start in words, the strongest first."""

@@ -107,19 +107,6 @@ def test_standard_input_is_read(cli: Cli, data: Path, monkeypatch: pytest.Monkey
     assert cli("analyse", "-", "--json").complaint.startswith("springmass: <stdin>: ")
 
 
-def test_recordings_and_channels_have_their_own_results(cli: Cli, tmp_path: Path) -> None:
-    """A text keeps its whole name, a run file its stem, and a chosen channel follows; no report replaces another."""
-    t = np.arange(1000) / 100
-    rows = "".join(f"{a:.2f},{0.2 + 0.05 * np.cos(8 * a):.5f},{0.3 + 0.04 * np.cos(9 * a):.5f}\n" for a in t)
-    for name in ("bob.txt", "bob.csv"):
-        (tmp_path / name).write_text(f"time (s),left (m),right (m)\n{rows}")
-    springmass.load(tmp_path / "bob.csv", channel="left").save(tmp_path / "bob.h5")
-    for name, *options in (("bob.txt", "--channel", "left"), ("bob.csv", "--channel", "right"), ("bob.h5",)):
-        assert cli("analyse", tmp_path / name, *options, "-o", tmp_path / "out").code == 0
-    folders = sorted(path.name for path in (tmp_path / "out").iterdir())
-    assert folders == ["bob.csv.right.results", "bob.results", "bob.txt.left.results"]
-
-
 @pytest.mark.parametrize(
     ("option", "names"),
     [

@@ -14,17 +14,10 @@ from springmass import load
 from tests.cli.conftest import Cli
 from tests.faults.conftest import on_a_terminal
 
-T_S = 0.790066
-
-
-def distance_cm(t: float) -> float:
-    """Return where the bob is."""
-    return 26.9 + 5.2 * math.cos(2 * math.pi * t / T_S)
-
 
 def line(number: int, form: bytes = b"%.2f cm\r\n") -> bytes:
-    """Return what a board prints as its reading of a number, at 100 Hz."""
-    return form % distance_cm(number / 100.0)
+    """Return what a board prints of a swing of 0.79 s as its reading of a number, at 100 Hz."""
+    return form % (26.9 + 5.2 * math.cos(math.tau * number / 79.0))
 
 
 def test_lines_that_come_together_are_all_used(cli: Cli, tmp_path: Path) -> None:

@@ -5,49 +5,23 @@ from pathlib import Path
 
 from acquisition.clock import VirtualClock
 from storage.recorder import Recorder
-from storage.run_file.reading import open_run
 from storage.wire_log.records import LogHeader, SensorEntry
 from tests.cli.conftest import Cli
 
 
-def write_log(path: Path, channels: int) -> None:
-    """Write a finished wire log of 200 readings for each sensor."""
-    sensors = tuple(SensorEntry(channel, "maxbotix-hr", f"port{channel}") for channel in range(channels))
-    with Recorder(path, LogHeader(sensors=sensors, mono_ns=0, unix_ns=0), VirtualClock()) as recorder:
-        for i in range(200):
-            for channel in range(channels):
-                recorder.reads([(channel, 100_000_000 * (i + 1), b"R%04d\r" % (1000 + i % 50))])
-
-
-def facts_of(out: str) -> dict[str, str]:
-    """Return the lines of a description, value by name; of several traps the last."""
-    return dict(line.split(None, 1) for line in out.splitlines())
-
-
-def test_a_wire_log_is_an_input(cli: Cli, data: Path, tmp_path: Path) -> None:
-    """What record leaves behind is described, converted and analysed like any recording; the log stays as it is."""
-    log = tmp_path / "run.wire"
-    write_log(log, channels=1)
-    before = log.read_bytes()
-    facts = facts_of(cli("formats", log).out)
-    assert (facts["format"], facts["kind"], facts["samples"]) == ("wire", "live", "200")
-    assert cli("convert", log, tmp_path / "run.h5").code == 0
-    with open_run(tmp_path / "run.h5") as run:
-        assert run.originals()[0].data == before == log.read_bytes()
-        assert len(run.samples()) == 200
-    assert cli("formats", log, "--rate-hz", "100").code == 2
-
-
 def test_the_sensors_of_a_wire_log_are_its_channels(cli: Cli, tmp_path: Path) -> None:
     """Several and none chosen: the line lists them; chosen by number or port."""
-    log = tmp_path / "run.wire"
-    write_log(log, channels=2)
+    log, sensors = tmp_path / "run.wire", tuple(SensorEntry(at, "maxbotix-hr", f"port{at}") for at in (0, 1))
+    with Recorder(log, LogHeader(sensors=sensors, mono_ns=0, unix_ns=0), VirtualClock()) as recorder:
+        for i in range(200):
+            recorder.reads([(at, 100_000_000 * (i + 1), b"R%04d\r" % (1000 + i % 50)) for at in (0, 1)])
     done = cli("formats", log)
     assert done.code == 3
     assert "port0" in done.complaint
     assert done.complaint.endswith(f"springmass formats {log} --channel 0")
     for name in ("1", "port1"):
-        assert facts_of(cli("formats", log, "--channel", name).out)["samples"] == "200"
+        facts = dict(line.split(None, 1) for line in cli("formats", log, "--channel", name).out.splitlines())
+        assert (facts["format"], facts["kind"], facts["samples"]) == ("wire", "live", "200")
 
 
 def test_a_run_of_a_zip_is_analysed(cli: Cli, data: Path, tmp_path: Path) -> None:

@@ -6,14 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from springmass.loading.load import sample_data
 from tests.cli.conftest import Cli
+from tests.cli.test_compare_cli import BARE, DATA, DISC, DISC_SCENE, RIGHT
 
-DATA = sample_data()
-BARE, DISC, CLIPPED = (str(DATA / f"{name}_simulated_position.txt") for name in ("undamped", "damped", "clipped"))
-BARE_SCENE, DISC_SCENE = (str(DATA / f"{name}.scene.toml") for name in ("undamped", "damped"))
+CLIPPED = str(DATA / "clipped_simulated_position.txt")
 CALLS = {
-    "a pair": ("compare", BARE, DISC, "--scene", BARE_SCENE, "--scene", DISC_SCENE, "--template", "latex"),
+    "a pair": ("compare", *RIGHT, "--template", "latex"),
     "a run": ("analyse", DISC, "--scene", DISC_SCENE, "--template", "latex", "--method", "classic"),
     "without a scene": ("analyse", CLIPPED, "--template", "latex", "--law", "power"),
     "three runs": ("analyse", BARE, DISC, CLIPPED),

@@ -1,6 +1,5 @@
 """A damping law on the command line: stated by an option, a scene file or a table of runs."""
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +7,7 @@ import pytest
 
 import springmass
 from tests.cli.conftest import Cli
+from tests.courses import rows_of
 
 RUN = "undamped_simulated_position.txt"
 
@@ -21,16 +21,10 @@ def run(tmp_path: Path) -> Path:
     return path
 
 
-def scene(folder: Path, law: str) -> Path:
-    """Return a scene file that states a law."""
-    path = folder / "bench.toml"
-    path.write_text(f'[bob]\nmass_kg = 0.2\n[damping]\nlaw = "{law}"\ngamma_per_s = 0.5\n')
-    return path
-
-
 def test_a_law_of_a_scene_file_is_named_first(cli: Cli, run: Path) -> None:
     """The first line of the output names the law; an option takes precedence over the file."""
-    bench = scene(run.parent, "linear")
+    bench = run.with_name("bench.toml")
+    bench.write_text('[bob]\nmass_kg = 0.2\n[damping]\nlaw = "linear"\ngamma_per_s = 0.5\n')
     assert "linear" in cli("analyse", run, "--scene", bench, "--no-report").out.splitlines()[0]
     (free,) = cli("analyse", run, "--scene", bench, "--law", "any", "--json").results
     assert free["damping"]["stated"] is None
@@ -45,9 +39,7 @@ def test_batch_takes_a_law_for_all_runs_and_for_each(cli: Cli, run: Path) -> Non
     folder = run.parent / "course"
     done = cli("batch", run, other, "--runs", table, "--law", "linear", "-o", folder, "--jobs", "1", "--reports", "0")
     assert done.code == 0, done.err
-    (results,) = folder.glob("*.csv")
-    with results.open(newline="") as file:
-        rows = {row["run"]: row for row in csv.DictReader(file)}
+    rows = {row["run"]: row for row in rows_of(folder / "results.csv")}
     assert {name: row["stated_law"] for name, row in rows.items()} == {"bob": "linear", "other": "quadratic"}
     assert rows["bob"]["law"] == rows["bob"]["one_law"] == "linear"
     table.write_text("path,law\nother.txt,cubic\n")

@@ -41,8 +41,11 @@ def test_several_inputs_share_one_table_and_one_report(cli: Cli, bench: Path, tm
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_a_report_of_other_runs_keeps_no_file_of_the_earlier_runs(cli: Cli, bench: Path, tmp_path: Path) -> None:
-    """Tables and figures of the earlier runs go; the files that a person put there stay."""
+@pytest.mark.parametrize("inside", [False, True])
+def test_a_report_of_other_runs_keeps_no_file_of_the_earlier_runs(
+    cli: Cli, bench: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, inside: bool
+) -> None:
+    """Tables and figures of the earlier runs go; files of a person stay, and a folder that somebody stands in too."""
     a, b, c, d = (bench / f"{name}.txt" for name in "abcd")
     for run in (a, b, c, d):
         shutil.copy(sample_data() / "cropped_simulated_position.txt", run)
@@ -51,10 +54,14 @@ def test_a_report_of_other_runs_keeps_no_file_of_the_earlier_runs(cli: Cli, benc
     folder = tmp_path / "together.results"
     earlier = set(contents(folder))
     assert {"a_motion.csv", "figures/a_position.svg"} <= earlier
-    (folder / "my_motion.csv").write_text("t,y\n")
+    if inside:
+        monkeypatch.chdir(folder)
+    else:
+        (folder / "my_motion.csv").write_text("t,y\n")
     assert cli("analyse", c, d, *options).code == 0
-    left = set(contents(folder))
-    assert {"c_motion.csv", "my_motion.csv"} <= left
+    left = set(contents(Path() if inside else folder))
+    assert {"c_motion.csv"} if inside else {"c_motion.csv", "my_motion.csv"} <= left
+    assert {path.name for path in tmp_path.iterdir()} == {"bench", folder.name}
     assert not [name for name in left & earlier if "a_" in name or "b_" in name or name.startswith("figures/")]
 
 

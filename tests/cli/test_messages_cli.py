@@ -16,14 +16,6 @@ from springmass.errors import INTERNAL, USAGE
 from tests.cli.conftest import Cli
 
 
-class Terminal(io.StringIO):
-    """A stream that is a terminal."""
-
-    def isatty(self) -> bool:
-        """Return whether it is a terminal."""
-        return True
-
-
 @pytest.mark.parametrize(("options", "lines"), [((), 1), (("-q",), 0), (("-v",), 2)])
 def test_quiet_and_verbose_choose_what_is_printed(
     cli: Cli, recording: Path, tmp_path: Path, options: tuple[str, ...], lines: int
@@ -40,9 +32,11 @@ def test_only_a_terminal_shows_the_next_command(
 ) -> None:
     """Not a pipe, whose lines another program reads; and not if only problems are wanted."""
     shown = []
-    for number, stream in enumerate((io.StringIO(), Terminal())):
+    for is_terminal in (False, True):
+        stream = io.StringIO()
+        monkeypatch.setattr(stream, "isatty", lambda answer=is_terminal: answer)
         monkeypatch.setattr(sys, "stderr", stream)
-        assert main(["convert", str(recording), str(tmp_path / f"{number}.h5"), *options]) == 0
+        assert main(["convert", str(recording), str(tmp_path / f"{is_terminal}.h5"), *options]) == 0
         shown.append("springmass analyse" in stream.getvalue())
     assert shown == [False, not options]
 

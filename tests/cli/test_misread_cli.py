@@ -194,13 +194,6 @@ def test_stamps_without_a_fraction_on_whole_seconds_are_read(read: Callable[...,
     assert "malformed_rows" not in codes(result)
 
 
-def test_fractions_of_a_day_are_asked_about(cli: Cli, tmp_path: Path) -> None:
-    """Not a period of 9 us."""
-    path = tmp_path / "run.csv"
-    path.write_text(csv("Time,Distance (cm)", rewritten(0.6096 + T / 86400, "{:.12f}"), rewritten(100 * Y)))
-    assert "--time-unit d" in cli("analyse", path, "--json").err
-
-
 def jump(after_s: float, by_s: float, seconds: float = 30.0) -> str:
     """Return a run whose clock is set after some seconds."""
     t = np.arange(round(100 * seconds)) / 100
@@ -256,26 +249,6 @@ def test_rows_with_more_cells_than_names_are_refused_with_the_reason(cli: Cli, t
 
 
 # Channels
-
-
-def test_row_numbers_and_constants_are_not_proposed(cli: Cli, read: Callable[..., Any], tmp_path: Path) -> None:
-    """Only the unit of the one channel that moves is asked."""
-    path = tmp_path / "run.csv"
-    clock = rewritten(1746967068.1273 + T, "{:.7f}")
-    path.write_text(
-        csv(
-            "seq_num,time,ranger,ranger_user_setpoint",
-            [str(i + 1) for i in range(T.size)],
-            clock,
-            rewritten(Y, "{:.6f}"),
-            ["0.0"] * T.size,
-        )
-    )
-    asked = cli("analyse", path)
-    assert asked.code == 3
-    assert "--channel" not in asked.complaint
-    assert "seq_num" not in asked.complaint[asked.complaint.index("?") :]
-    read(path, "--unit", "m")
 
 
 def test_a_question_names_at_most_eight_channels_and_one_whole_command(cli: Cli, tmp_path: Path) -> None:

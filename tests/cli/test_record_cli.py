@@ -16,28 +16,19 @@ from acquisition.simulated import VirtualPort, VirtualRangefinder, VirtualSensor
 from springmass import analyse, load
 from springmass.cli import main
 from storage.run_file.reading import open_run
-from tests.cli.conftest import Cli
+from tests.cli.conftest import BENCH, Cli
 from tests.faults.conftest import frame_of, line_of, on_a_terminal
 from tests.sampling import sampled
 
-SCENE = """
-[bob]
-mass_kg = 0.05
-[spring]
-constant_n_per_m = 14.0
-[start]
-displacement_m = 0.05
-[damping]
-gamma_per_s = 0.01
-"""
-OMEGA = (14.0 / 0.05) ** 0.5
+OMEGA = 10.0
+"""Of the bench, rad/s."""
 
 
 @pytest.fixture
 def scene(tmp_path: Path) -> Path:
-    """Return the scene of a bob that swings 2.7 times a second."""
+    """Return the scene of a bench."""
     path = tmp_path / "bench.toml"
-    path.write_text(SCENE)
+    path.write_text(BENCH)
     return path
 
 
@@ -52,7 +43,7 @@ def silent_port() -> Iterator[str]:
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a run of two seconds, recorded from the simulated sensor."""
     folder = tmp_path_factory.mktemp("recorded")
-    (folder / "bench.toml").write_text(SCENE)
+    (folder / "bench.toml").write_text(BENCH)
     run = folder / "run.h5"
     assert main(["record", "--simulate", "--scene", str(folder / "bench.toml"), "--seconds", "2", "-o", str(run)]) == 0
     return run

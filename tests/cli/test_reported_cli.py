@@ -59,14 +59,6 @@ def test_six_of_six_on_the_reports_own_table(bench: list[str], tmp_path: Path, c
     assert len(result["reported"]) == len(PRINTED)
 
 
-def test_a_value_that_no_usual_mistake_explains_differs(bench: list[str], tmp_path: Path, cli: Cli) -> None:
-    """It is said how far off it is; a quantity that a recording does not give is not compared, and says so."""
-    rows: list[Row] = [("bare", "period", 0.9, 0.001, "s"), ("bare", "colour", 3, "", "")]
-    (result,) = cli("compare", *bench, "--reported", write_table(tmp_path / "t.csv", rows), "--json").results
-    assert "reported_differs" in {f["code"] for f in result["findings"]}
-    assert result["reported"][1]["verdict"].startswith("not compared")
-
-
 @pytest.mark.parametrize(
     ("line", "words"),
     [

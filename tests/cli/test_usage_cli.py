@@ -23,7 +23,7 @@ def test_every_command_explains_itself(cli: Cli, monkeypatch: pytest.MonkeyPatch
 
 
 def test_the_first_help_is_short_and_quick() -> None:
-    """First what a student, a course and a bench need, a line each; no command is imported for it, and no numpy."""
+    """No command is imported for it, and no numpy; it fits a screen with a line for each command of a student."""
     code = "import sys; from springmass.cli import main; main(['--help']); print('numpy' in sys.modules)"
     environment = {**os.environ, "COLUMNS": "80"}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)

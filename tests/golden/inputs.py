@@ -153,6 +153,11 @@ def _table(head: str, form: str = "{:.2f},{:.3f}") -> str:
     return "\n".join([*([head] if head else []), *rows, ""])
 
 
+def _rewritten(head: str, row: Callable[[int, float, str], str]) -> str:
+    rows = (each.split(",") for each in _table("").splitlines())
+    return "\n".join([head, *(row(i, float(t), x) for i, (t, x) in enumerate(rows)), ""])
+
+
 def _only_values(head: str) -> str:
     return "\n".join([head, *(row.partition(",")[2] for row in _table("").splitlines())])
 
@@ -187,6 +192,10 @@ _ODD: dict[str, Callable[[], str | bytes]] = {
     ),
     "constant.csv": lambda: "time (s),height (cm)\n" + "".join(f"{0.01 * i:.2f},22.5\n" for i in range(500)),
     "three-rows.csv": lambda: "time (s),height (cm)\n0.00,22.1\n0.01,22.3\n0.02,22.2\n",
+    "row-numbers.csv": lambda: _rewritten(
+        "seq_num,time,ranger,setpoint", lambda i, t, x: f"{i},{1.7e9 + t:.2f},{x},0.0"
+    ),
+    "days.csv": lambda: _rewritten("Time,Distance (cm)", lambda _, t, x: f"{0.6096 + t / 86400.0:.12f},{x}"),
     "no-mass.toml": lambda: "[bob]\nmass_kg = -0.2\n",
     "unknown-key.toml": lambda: "[bob]\nmas_kg = 0.2\n",
     "not.toml": lambda: "[bob\n",
@@ -200,6 +209,7 @@ _ODD: dict[str, Callable[[], str | bytes]] = {
     "reported.csv": lambda: (
         "run,name,value,u,unit\ndamped_simulated_position,T,0.79,0.01,s\n"
         "undamped_simulated_position,T,0.790066,0.00002,s\ndamped_simulated_position,k,14.0,0.1,N/m\n"
+        "damped_simulated_position,T,0.9,0.001,s\ndamped_simulated_position,colour,3,,\n"
     ),
     "hooke.csv": lambda: (
         "mass_kg,rest_m\n" + "".join(f"{mass},{0.20 + 9.81 * mass / 14.0:.4f}\n" for mass in (0.1, 0.15, 0.2, 0.25))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from storage.atomic import whole_file, whole_folder, write_whole
+from storage.atomic import whole_file, write_whole
 from storage.errors import RunExists, WriteFailed
 
 
@@ -119,34 +119,3 @@ def test_two_writers_of_a_file_come_one_after_the_other(tmp_path: Path) -> None:
         temporary.write_text("first")
     thread.join(60)
     assert {each.name: each.read_text() for each in tmp_path.iterdir()} == {"a": "second"}
-
-
-NAMES = {"page", "table", "old", "figures/a"}
-
-
-def held(folder: Path) -> dict[str, str]:
-    """Return what a folder holds, hidden things beside it among them."""
-    every = [*folder.rglob("*"), *folder.parent.glob(".*")]
-    return {os.path.relpath(each, folder): each.read_text() for each in every if each.is_file()}
-
-
-def make(folder: Path, content: str) -> None:
-    """Write a result whole."""
-    with whole_folder(folder, NAMES, "page") as part:
-        (part / "table").write_text(content)
-        (part / "page").write_text(content)
-
-
-@pytest.mark.parametrize("inside", [False, True])
-def test_what_others_put_there_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, inside: bool) -> None:
-    """A folder with other files, or that somebody stands in, keeps its place and its files; stale ones of ours go."""
-    folder = tmp_path / "mine"
-    make(folder, "1")
-    (folder / "old").write_text("1")
-    if inside:
-        monkeypatch.chdir(folder)
-        folder = Path()
-    else:
-        (folder / "notes.txt").write_text("mine")
-    make(folder, "2")
-    assert held(folder.resolve()) == {"page": "2", "table": "2"} | ({} if inside else {"notes.txt": "mine"})

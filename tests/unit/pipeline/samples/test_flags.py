@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 
 from pipeline.analyse import analyse
-from pipeline.track import F8, U8, Quality, Track
+from pipeline.track import F8, Quality, Track
 from tests.synthetic import Truth, noisy, times
 
 
-def swing(seconds: float = 10.0, sigma_m: float = 1e-4, seed: int = 1) -> tuple[F8, F8]:
+def swing() -> tuple[F8, F8]:
     """Return times and distances of a bob."""
-    t = times(seconds)
-    return t, noisy(Truth(), t, sigma_m, seed)
+    t = times(10.0)
+    return t, noisy(Truth(), t, 1e-4, 1)
 
 
-def flagged(t: F8, y: F8, bit: Quality, flags: U8 | None = None) -> list[int]:
+def flagged(t: F8, y: F8, bit: Quality) -> list[int]:
     """Return the rows that carry a flag after the analysis."""
-    found = analyse(Track.from_arrays(t, y, flags=flags)).flags
+    found = analyse(Track.from_arrays(t, y)).flags
     assert found.size == t.size
     rows: list[int] = np.flatnonzero(found & np.uint8(bit)).tolist()
     return rows
@@ -31,17 +31,6 @@ def test_times_that_repeat_or_run_back_are_flagged() -> None:
     t[40] = t[45]  # a leap forward: rows 41 to 44 are then behind it, row 45 repeats it
     assert flagged(t, y, Quality.DUPLICATE_TIME) == [10, 45]
     assert flagged(t, y, Quality.NON_MONOTONIC_TIME) == [20, 30, 41, 42, 43, 44]
-
-
-def test_flags_of_the_recording_stay() -> None:
-    """Bits known before the analysis are kept, and a gap before a sample does not exclude it."""
-    t, y = swing()
-    flags = np.zeros(1000, np.uint8)
-    flags[5], flags[6] = Quality.MALFORMED, Quality.GAP_BEFORE
-    track = Track.from_arrays(t, y, flags=flags)
-    found = analyse(track)
-    assert (found.flags[5], found.flags[6]) == (Quality.MALFORMED, Quality.GAP_BEFORE)
-    np.testing.assert_array_equal(track.flags, flags)
 
 
 @pytest.mark.parametrize("height_m", [0.02, 2.0, -0.1])

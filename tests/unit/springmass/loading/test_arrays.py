@@ -1,6 +1,7 @@
 """Arrays in memory: units are read or refused, never ignored."""
 
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,13 @@ ARRAYS: dict[str, tuple[Any, dict[str, str]]] = {
     "index of times": (pd.Series(Y, index=T), {}),
     "dates with a zone": (pd.Series(Y, index=pd.to_datetime(1e9 * T).tz_localize("Europe/Berlin")), {}),
     "column of dates": (pd.DataFrame({"time": pd.to_datetime(1e9 * T).tz_localize("UTC"), "distance": Y}), {}),
+    "quantities of pint": (
+        (
+            SimpleNamespace(magnitude=1e3 * T, units="millisecond"),
+            SimpleNamespace(magnitude=1e2 * Y, units="centimeter"),
+        ),
+        {},
+    ),
     "masked values": ((T, np.ma.masked_array(Y, np.arange(T.size) == 1500)), {}),
 }
 
@@ -36,20 +44,6 @@ def test_a_unit_is_read(name: str) -> None:
     assert found["T"].value == pytest.approx(2.0 * np.pi / 8.0, rel=1e-5)
     assert found["A0"].value == pytest.approx(0.05, rel=1e-3)
     assert found["A0"].unit == "m"
-
-
-class Quantity:
-    """An array with a unit, as the package pint has it."""
-
-    def __init__(self, magnitude: Any, units: str) -> None:
-        self.magnitude, self.units = magnitude, units
-
-
-def test_quantities_of_pint_are_converted() -> None:
-    """Their names of units are spelled out."""
-    found = sm.analyse((Quantity(1000.0 * T, "millisecond"), Quantity(100.0 * Y, "centimeter")))
-    assert found["T"].value == pytest.approx(2.0 * np.pi / 8.0, rel=1e-5)
-    assert found["A0"].value == pytest.approx(0.05, rel=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ import pytest
 from acquisition.block import Block, SourceInfo, concatenate
 from acquisition.errors import PortError
 from acquisition.recordings.recording import FormatIssue, Original
-from storage.errors import NotARun, RunDamaged, RunExists, RunOpen, WriteFailed
+from storage.errors import NotARun, RunDamaged, RunOpen, WriteFailed
 from storage.run_file.layout import CHUNK, HEADER
 from storage.run_file.reading import open_run
 from storage.run_file.writing import write_run
@@ -75,22 +75,6 @@ def test_many_chunks_come_back(tmp_path: Path) -> None:
     with open_run(path) as run:
         assert bits(run.samples()) == bits(whole)
         run.verify()
-
-
-def test_a_standing_run_is_not_overwritten_unasked(path: Path) -> None:
-    """Measured data are immutable: the refusal comes before any block is asked for."""
-
-    def never() -> Iterator[Block]:
-        raise AssertionError("asked for a block")
-        yield
-
-    before = path.read_bytes()
-    with pytest.raises(RunExists):
-        write_run(path, never(), INFO)
-    assert path.read_bytes() == before
-    write_run(path, [block(4)], INFO, overwrite=True)
-    with open_run(path) as run:
-        assert len(run) == 4
 
 
 @pytest.mark.parametrize("error", [PortError("unplugged"), KeyboardInterrupt()])
