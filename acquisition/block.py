@@ -153,6 +153,8 @@ class SourceInfo:
         Error of a distance as stated in the recording, m; None if not stated. It may differ from the noise.
     u_rate : float or None
         Relative standard uncertainty of the rate of times that follow from arrivals, besides that of their clock.
+    misplaced_s : float or None
+        Time by which samples are early or late up to the next lost one if the place of one is wrong, s.
     """
 
     kind: SourceKind
@@ -163,3 +165,4 @@ class SourceInfo:
     clock: ClockKind = "nominal"
     stated_error_m: float | None = None
     u_rate: float | None = None
+    misplaced_s: float | None = None

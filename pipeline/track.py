@@ -63,6 +63,7 @@ class Track:
     held_samples: int = 0
     longest_stall_s: float = 0.0
     u_rate: float = 0.0  # relative standard uncertainty of the rate of times that follow from arrivals
+    misplaced_s: float = 0.0  # by which samples may be early or late up to the next one that was lost
     compared_s: float | None = None  # duration of the comparison of the clocks; None for the whole recording
     speed_of_sound_m_per_s: float | None = None  # with which echo times were converted to distances
     sonic: bool = False  # whether the distances are those of echoes, whose scale changes with the air
@@ -75,7 +76,7 @@ class Track:
         if self.unit not in RECORDED_UNITS:
             known = ", ".join(f"{recorded.quantity} in {unit}" for unit, recorded in RECORDED_UNITS.items())
             raise TrackError(f"a track holds one of {known}, got the unit {self.unit}", "convert to SI first")
-        for name in ("u_scale", "u_offset_m", "u_rate", "clock_limit", "compared_s"):
+        for name in ("u_scale", "u_offset_m", "u_rate", "misplaced_s", "clock_limit", "compared_s"):
             if (value := getattr(self, name)) is not None and not (math.isfinite(value) and value >= 0.0):
                 raise TrackError(f"{name} must be finite and not negative, got {value:g}", "leave it out")
         if self.speed_of_sound_m_per_s is not None:  # only echoes have one

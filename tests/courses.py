@@ -58,6 +58,12 @@ def faulty_course(folder: Path) -> list[str]:
     return [str(folder / "runs"), "--runs", str(folder / "runs.csv"), "--jobs", "1", "--accuracy", "fast"]
 
 
+def rows_of(table: str | Path) -> list[dict[str, str]]:
+    """Return the rows of a CSV."""
+    with Path(table).open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
 def contents(folder: Path) -> dict[str, bytes]:
     """Return every file of a course's results by name, except its data, whose order varies, and its lock."""
     files = [path for path in sorted(folder.rglob("*")) if path.is_file() and not path.match("course.*")]

@@ -78,7 +78,7 @@ class ClockSamples:
         return fit_clock(*self._times[:])
 
 
-def fit_clock(t: F8, host_ns: I8) -> ClockFit:
+def fit_clock(t: F8, host_ns: I8, *, step_s: float = 0.0) -> ClockFit:
     """Fit a line to the (n,) host times as a function of the sensor times in s, and return the comparison of clocks.
 
     The sensor times are those of the pings: times of reflection vary with the position of the bob.
@@ -96,7 +96,8 @@ def fit_clock(t: F8, host_ns: I8) -> ClockFit:
     a silence or its readings arrive together.
 
     If the minimum delay jumps permanently, the lines before and after the jump have the same slope but different
-    offsets. The importers of LSL (lab streaming layer) treat restarted streams in the same way [2]_.
+    offsets. The importers of LSL (lab streaming layer) treat restarted streams in the same way [2]_. Times that count
+    steps of ``step_s`` are late by up to a step where several arrive together, so that such a jump shows nothing.
 
     .. [1] S. B. Moon, P. Skelly, D. Towsley, "Estimation and removal of clock skew from network delay measurements",
        IEEE INFOCOM 1999, doi:10.1109/INFCOM.1999.749287.
@@ -122,7 +123,7 @@ def fit_clock(t: F8, host_ns: I8) -> ClockFit:
     x, delay = x[~held], delay[~held]
     if x.size < MIN_SAMPLES:
         return without
-    steps = _steps(x, delay)
+    steps = _steps(x, delay, max(JUMP_STEP_S, 1.5 * step_s))
     part = np.searchsorted(steps, np.arange(x.size), side="right")
     candidates = [_through_minima(x, delay, part), _through_all(x, delay, part)]
     slope, u_slope = min(candidates, key=lambda line: line[1])
@@ -163,7 +164,7 @@ def _stalls(x: F8, delay: F8, late: F8) -> list[tuple[int, int]]:
     return stalls
 
 
-def _steps(x: F8, delay: F8) -> I8:
+def _steps(x: F8, delay: F8, least_s: float) -> I8:
     """Return the rows at which one clock jumped relative to the other, found by steps in the minimum delay."""
     parts = _parts(x, 48)
     if len(parts) < 12:
@@ -172,7 +173,7 @@ def _steps(x: F8, delay: F8) -> I8:
     dx, rise = np.diff(x[lowest]), np.diff(delay[lowest])
     deviation = rise - float(np.median(rise / dx)) * dx
     scatter = 1.4826 * float(np.median(np.abs(deviation - np.median(deviation))))
-    jumps = np.flatnonzero(np.abs(deviation) > max(JUMP_STEP_S, 10.0 * scatter))
+    jumps = np.flatnonzero(np.abs(deviation) > max(least_s, 10.0 * scatter))
     return np.array([parts[at + 1][0] for at in jumps.tolist()], np.int64)
 
 

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from acquisition.block import F8, I8, U8, Block, Flag, SourceInfo
+from acquisition.decoders.sensor import RESONATOR_PPM
 from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S
 from acquisition.live.clock_fit import NANO, fit_clock
 
@@ -61,7 +62,8 @@ class LineClock:
 
     ``steps`` is "even" for whole steps of one length, "echo" for steps that include the time of the echo, and "reads"
     for lines that were spread over the time since the read before. ``u_rate_ppm`` is the standard uncertainty of their
-    rate by the host's clock, whose own is not included. ``read_s`` is the median time between reads.
+    rate by the host's clock, whose own is not included. ``read_s`` is the median time between reads. ``misplaced_s`` is
+    the time by which lines are early or late up to the next lost line if the place of one is wrong; 0 if none can be.
     """
 
     steps: str
@@ -69,12 +71,13 @@ class LineClock:
     u_rate_ppm: float
     read_s: float
     lost: int = 0
+    misplaced_s: float = 0.0
 
     def described(self, info: SourceInfo) -> SourceInfo:
         """Return the description of a source with the rate of its lines."""
         if not math.isfinite(self.u_rate_ppm):
             return info
-        return replace(info, rate_hz=self.rate_hz, u_rate=1e-6 * self.u_rate_ppm)
+        return replace(info, rate_hz=self.rate_hz, u_rate=1e-6 * self.u_rate_ppm, misplaced_s=self.misplaced_s)
 
 
 UNKNOWN = LineClock("reads", math.nan, math.inf, math.nan)
@@ -188,9 +191,10 @@ def line_times(host_ns: I8, distance_m: F8) -> tuple[F8, LineClock]:
                 echo = None
         if longer is not None and echo is not None and echo.breaks <= MOST_BREAKS:
             t = echo.times + np.interp(echo.times, t - longer, longer)
-            clock = LineClock("echo", 1.0 / echo.step_s, echo.u_ppm, interval, echo.lost)
+            clock = LineClock("echo", 1.0 / echo.step_s, echo.u_ppm, interval, echo.lost, echo.misplaced_s)
         elif even is not None and even.breaks <= MOST_BREAKS:
-            t, clock = even.times, LineClock("even", 1.0 / even.step_s, even.u_ppm, interval, even.lost)
+            t = even.times
+            clock = LineClock("even", 1.0 / even.step_s, even.u_ppm, interval, even.lost, even.misplaced_s)
     return t - t[0], clock
 
 
@@ -234,21 +238,21 @@ class _Even(NamedTuple):
     late: F8
     breaks: float
     cost: float
+    misplaced_s: float
 
     @classmethod
     def of(cls, reads: Reads, at: F8, gaps: F8) -> _Even | None:
         """Find the steps of lines that arrive with the reads ``at``, s."""
         counted = _all_arrived(reads, at)
-        steps, cost, u_choice = (np.arange(gaps.shape[0]), 0.0, 0.0) if counted else _with_losses(reads, at, gaps)
+        steps, cost = (np.arange(gaps.shape[0]), 0.0) if counted else _with_losses(reads, at, gaps)
         x = (steps - steps[0])[reads.last]
         step_s = float(at[-1] - at[0]) / float(x[-1] - x[0])
-        fit = fit_clock(step_s * x, np.rint(at / NANO).astype(np.int64))
+        fit = fit_clock(step_s * x, np.rint(at / NANO).astype(np.int64), step_s=step_s)
         if not math.isfinite(fit.u_rate_error_ppm):
             return None
         step_s, u_ppm = _unlocked(step_s / (1.0 + 1e-6 * fit.rate_error_ppm), fit.u_rate_error_ppm, at, x)
         lost = int(steps[-1] - steps[0]) + 1 - steps.size
-        if lost and gaps.shape[0] > 2 * at.size:  # a wrong place moves the lines up to the next loss by a step
-            u_ppm = math.hypot(u_ppm, u_choice, 1e6 * step_s / (math.sqrt(12.0) * float(at[-1] - at[0])))
+        misplaced_s = step_s if lost and gaps.shape[0] > 2 * at.size else 0.0  # a read of two lines shows the place
         times = step_s * (steps - steps[0]) + _bend(at - step_s * x, x, steps - steps[0])
         late, early = at - times[reads.last], at[:-1] - times[reads.first[1:]]
         breaks = 0
@@ -260,7 +264,7 @@ class _Even(NamedTuple):
             if not counted:
                 breaks += int(np.count_nonzero(latest < start - 0.5 * step_s))
                 breaks += int(np.count_nonzero(earliest > start + 0.5 * step_s))
-        return cls(times, step_s, u_ppm, lost, late, breaks / late.size, cost)
+        return cls(times, step_s, u_ppm, lost, late, breaks / late.size, cost, misplaced_s)
 
 
 def _all_arrived(reads: Reads, at: F8) -> bool:
@@ -275,21 +279,18 @@ def _all_arrived(reads: Reads, at: F8) -> bool:
     return bool(np.abs(minima - np.median(minima)).max() < 0.35 * slope)
 
 
-def _with_losses(reads: Reads, at: F8, gaps: F8) -> tuple[I8, float, float]:
-    """Return the steps of lines of which some were lost, minus the log likelihood of the numbers of lines, and u, ppm.
-
-    The uncertainty is that of the choice between a nominal rate and another.
-    """
+def _with_losses(reads: Reads, at: F8, gaps: F8) -> tuple[I8, float]:
+    """Return the steps of lines of which some were lost, and minus the log likelihood of the numbers of lines."""
     steps = np.empty(gaps.shape[0], np.int64)
-    grid, ways, cost, u_ppm = None, _ways(reads, gaps), 0.0, 0.0
+    grid, ways, cost = None, _ways(reads, gaps), 0.0
     for part in _segments(reads):
         grid = _Grid.of(at[part], reads.size[part], ways[part], grid)
-        cost, u_ppm = cost + grid.cost, max(u_ppm, grid.u_ppm)
+        cost += grid.cost
         rows = slice(int(reads.first[part][0]), int(reads.last[part][-1]) + 1)
         steps[rows] = _steps(grid, at[part], reads.size[part], gaps, rows.start)
         if rows.start:
             steps[rows] += max(0, int(steps[rows.start - 1] + 1 - steps[rows.start]))
-    return steps, cost, u_ppm
+    return steps, cost
 
 
 def _parts(at: F8) -> Iterator[slice]:
@@ -318,7 +319,9 @@ def _unlocked(step_s: float, u_ppm: float, at: F8, x: I8) -> tuple[float, float]
 
     An adapter hands over at whole milliseconds of its clock. If the step is also a whole number of them, all delays
     differ by whole grains, their common divisor, and a board whose clock differs a little moves no line to another
-    read. Both are then assumed to keep their nominal rates as crystals do.
+    read. Both are then assumed to keep their nominal rates as crystals do. The rate of the adapter is that at which the
+    delays agree best; where that is beyond an adapter's, the lines themselves were timed. Where lines do come together,
+    the board may as well have a resonator that happens to move none.
     """
     whole_s, span_s = 1e-3 * round(1e3 * step_s), float(at[-1] - at[0])
     if not whole_s or abs(step_s / whole_s - 1.0) * span_s > 3.0 * whole_s:
@@ -328,16 +331,19 @@ def _unlocked(step_s: float, u_ppm: float, at: F8, x: I8) -> tuple[float, float]
         late = at - whole_s * np.outer(rates, x)
         agreement = np.abs(np.exp(2j * np.pi * late / grain_s).mean(axis=1))
         best = int(np.argmax(agreement))
-        if agreement[best] > 0.9:
+        if agreement[best] > 0.9 and 0 < best < rates.size - 1:
             tenth = max(at.size // 10, 1)
             moved = round(float(np.median(late[best, -tenth:]) - np.median(late[best, :tenth])) / grain_s)
             hidden = 1e6 * grain_s / span_s
-            if abs(moved) < 2:
-                shift_ppm = 0.5 * hidden * moved
-                return whole_s * float(rates[best]) * (1.0 + 1e-6 * shift_ppm), math.hypot(
-                    U_LOCKED_PPM, 1.2 * shift_ppm
-                )
-            return step_s, math.hypot(u_ppm, hidden / math.sqrt(12.0))
+            if abs(moved) > 1:
+                return step_s, math.hypot(u_ppm, hidden / math.sqrt(12.0))
+            shift_ppm = 0.5 * hidden * moved
+            scatter = math.sqrt(max(0.0, -2.0 * math.log(agreement[best]))) / math.tau  # in grains
+            u_ppm = math.hypot(U_LOCKED_PPM, scatter * hidden * math.sqrt(12.0 / at.size), 1.2 * shift_ppm)
+            if x[-1] > 1.5 * at.size:
+                # Of resonators up to the limit, this share moves none; their rates are a triangle of width 2 hidden.
+                u_ppm = math.hypot(u_ppm, hidden * math.sqrt(hidden / (hidden + 2.0 * RESONATOR_PPM) / 6.0))
+            return whole_s * float(rates[best]) * (1.0 + 1e-6 * shift_ppm), u_ppm
     return step_s, u_ppm
 
 
@@ -360,16 +366,12 @@ def _segments(reads: Reads) -> Iterator[slice]:
 
 
 class _Grid(NamedTuple):
-    """Slots ``start_s + k step_s`` in which lines may be sent, and the share of them whose line was lost.
-
-    ``u_ppm`` is the standard deviation of the step if it may be the nominal one or another, each with its probability.
-    """
+    """Slots ``start_s + k step_s`` in which lines may be sent, and the share of them whose line was lost."""
 
     start_s: float
     step_s: float
     share: float
     cost: float
-    u_ppm: float = 0.0
 
     @classmethod
     def of(cls, at: F8, size: I8, ways: F8, before: _Grid | None) -> _Grid:
@@ -405,11 +407,9 @@ class _Grid(NamedTuple):
         starts = at[0] - np.linspace(0.0, 1.0, 60, endpoint=False) * nominal
         costs, shares = _cost(at, size, ways, starts[None], np.array([nominal]))
         chosen = int(np.argmin(costs))
-        ahead = float(np.clip(likeliest.cost + NOMINAL - costs[0, chosen], -50.0, 50.0))
-        doubt = 1e6 * abs(likeliest.step_s / nominal - 1.0) * 0.5 / math.cosh(0.5 * ahead)
-        if ahead > 0.0:
-            likeliest = cls(float(starts[chosen]), nominal, float(shares[0, chosen]), float(costs[0, chosen]))
-        return likeliest._replace(u_ppm=doubt)
+        if costs[0, chosen] > likeliest.cost + NOMINAL:
+            return likeliest
+        return cls(float(starts[chosen]), nominal, float(shares[0, chosen]), float(costs[0, chosen]))
 
 
 def _cost(at: F8, size: I8, ways: F8, starts: F8, steps: F8) -> tuple[F8, F8]:

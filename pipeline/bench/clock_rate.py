@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from pipeline.errors import TrackError
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.levels import SIGNIFICANT
-from pipeline.track import Track
+from pipeline.track import Quality, Track
 
 # Relative standard uncertainty of a crystal's rate: 50 ppm, as in data sheets, as the half-width of a rectangle.
 U_CRYSTAL = 50e-6 / math.sqrt(3.0)
@@ -51,7 +53,7 @@ def clock_rate(track: Track) -> ClockRate:
         words = (
             f"the scene states {fast * 1e6:+.4g} ppm for the clock (u {u_fast * 1e6:.2g}): frequencies are corrected"
         )
-        return ClockRate(Estimate(1.0 + fast, math.hypot(u_fast, track.u_rate)), words)
+        return ClockRate(Estimate(1.0 + fast, math.hypot(u_fast, _u_of_arrivals(track))), words)
     own = U_CRYSTAL if track.u_clock is None else track.u_clock
     spec = f"a crystal's {U_CRYSTAL * 1e6:.0f} ppm" if track.u_clock is None else f"the stated {own * 1e6:.2g} ppm"
     limit = math.inf if track.clock_limit is None else track.clock_limit + HOST_LIMIT
@@ -106,7 +108,20 @@ def _uncompared(track: Track, limit: float, own: float, spec: str) -> ClockRate:
         return ClockRate(_uncorrected(half), words, True)
     source = {"nominal": "are row numbers over the nominal rate", "host": "are the host's"}
     times = source.get(track.clock, "were measured by the device")
-    if track.u_rate:
-        times, spec = "follow from arrivals", f"{spec.removesuffix(' ppm')} and their {track.u_rate * 1e6:.2g} ppm"
-    rate = Estimate(1.0, math.hypot(own, track.u_rate))
+    if u_rate := _u_of_arrivals(track):
+        times, spec = "follow from arrivals", f"{spec.removesuffix(' ppm')} and their {u_rate * 1e6:.2g} ppm"
+    rate = Estimate(1.0, math.hypot(own, u_rate))
     return ClockRate(rate, f"times {times}: {spec} stand in every frequency's uncertainty")
+
+
+def _u_of_arrivals(track: Track) -> float:
+    """Return the relative standard uncertainty of the rate of times that follow from arrivals.
+
+    Where the places of lost samples are wrong, the times run off by one step and jump back. The duration of a whole
+    recording is wrong by any part of a step; a part that ends where the phase jumps runs off by all of it.
+    """
+    if not track.misplaced_s:
+        return track.u_rate
+    inside = (track.flags & Quality.OUTSIDE) == 0
+    run_off_s = track.misplaced_s * (1.0 / math.sqrt(12.0) if inside.all() else 1.0)
+    return math.hypot(track.u_rate, run_off_s / float(np.ptp(track.t[inside])))

@@ -229,6 +229,8 @@ def _how_read(run: RecoveredRun) -> Iterator[str]:
         "reads": "they come at no even rate, so their times are spread between the reads",
     }[lines["steps"]]
     u = f"known to {lines['u_rate_ppm']:.2g} ppm"
+    if lines["misplaced_s"]:
+        u += f", and between lost lines to {1e3 * lines['misplaced_s']:.3g} ms"
     yield (
         f"{run.sensor.port}: {lines['rate_hz']:.4g} lines per second without a time, read every "
         f"{1e3 * lines['read_s']:.3g} ms, {lines['lost']} lost; {how} ({u})"

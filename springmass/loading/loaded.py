@@ -134,7 +134,7 @@ def _track_of(recording: Recording, provenance: Mapping[str, Any]) -> Track:
     """
     samples, info = recording.samples, recording.info
     # But for its name, a track states what a source states under the same names.
-    of_source = {**asdict(info), "u_rate": info.u_rate or 0.0}
+    of_source = {**asdict(info), "u_rate": info.u_rate or 0.0, "misplaced_s": info.misplaced_s or 0.0}
     del of_source["name"]
     moments = [t_s for t_s, event in recorded_events(provenance) if isinstance(event.typed, Triggered)]
     return Track(

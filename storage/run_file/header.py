@@ -29,6 +29,7 @@ class Info(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     clock: ClockKind = "nominal"
     stated_error_m: Annotated[float, Meta(ge=-1e30, le=1e30)] | None = None  # as printed in a recording
     u_rate: _Length | None = None
+    misplaced_s: _Length | None = None
 
 
 class FileEntry(Struct, frozen=True, forbid_unknown_fields=True):

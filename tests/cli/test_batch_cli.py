@@ -1,6 +1,5 @@
 """``springmass batch``: one table of many runs, made the same on every way."""
 
-import csv
 import fcntl
 import json
 import os
@@ -14,7 +13,7 @@ import pytest
 
 import springmass
 from springmass.layout import PACKAGES
-from tests.courses import bad_files, contents, damped, short_course, write_recording
+from tests.courses import bad_files, contents, damped, rows_of, short_course, write_recording
 from tests.sampling import sampled
 
 ROOT = Path(__file__).parents[2]
@@ -35,17 +34,11 @@ def runs(shelf: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return Path(shutil.copytree(shelf, tmp_path / "runs").name)
 
 
-def rows(folder: str | Path) -> list[dict[str, str]]:
-    """Return the table's rows."""
-    with (Path(folder) / "results.csv").open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
-
-
 def test_a_folder_becomes_a_table_a_page_and_reports(runs, cli):
     """One row a run, reports of the worst, and a frame in Python."""
     done = cli("batch", runs, "-o", "out", "--jobs", "1", "--reports", "1")
     assert done.code == 0
-    table = rows("out")
+    table = rows_of("out/results.csv")
     assert [row["run"] for row in table] == [f"run{i:03d}" for i in range(6)]
     (report,) = Path("out/reports").glob("*/report.html")
     page = Path("out/index.html").read_text()
@@ -68,12 +61,12 @@ def test_a_second_pass_analyses_nothing_and_a_change_only_what_changed(runs, cli
     assert contents(Path("out")) == before
     shutil.copy(runs / "run000.txt", runs / "run005.txt")
     assert "5 unchanged, 1 analysed" in cli(*command).err
-    table = rows("out")
+    table = rows_of("out/results.csv")
     assert table[5]["period"] == table[0]["period"]
     assert "0 unchanged, 6 analysed" in cli(*command[:-1], "standard").err
     (runs / "run003.about.toml").write_text("[scene.bob]\nmass_kg = 0.2\n")
     assert "5 unchanged, 1 analysed" in cli(*command[:-1], "standard").err
-    assert rows("out")[3]["bob_mass_kg"] == "0.2"
+    assert rows_of("out/results.csv")[3]["bob_mass_kg"] == "0.2"
 
 
 @pytest.mark.trials
@@ -92,7 +85,7 @@ def test_a_changed_program_analyses_all_runs(runs, tmp_path):
         command = [sys.executable, "-m", "springmass", "batch", runs / "run000.txt", "-o", "out", *QUICK]
         environment = {**os.environ, "PYTHONPATH": str(checkout)}
         program = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
-        (row,) = rows("out")
+        (row,) = rows_of("out/results.csv")
         return re.findall(r"\d un.*analysed", program.stderr)[0], row["software"]
 
     git("init", "-q")
@@ -139,13 +132,13 @@ def test_bad_files_fail_alone(tmp_path, monkeypatch, cli, good):
     assert done.code == 1
     assert f"{good + len(bad)} runs: 0 unchanged, {good + len(bad)} analysed, {len(bad)} failed" in done.err
     assert "defect of the program" not in done.err
-    table = rows("bad")
+    table = rows_of("bad/results.csv")
     failed = [row for row in table if row["status"] != "ok"]
     assert sorted(row["path"] for row in failed) == sorted(bad)
     for row in failed:
         assert row["path"] in row["error"]
         assert done.err.splitlines().count(f"springmass: {row['error']}") == 1
-    assert [row for row in table if row["status"] == "ok"] == rows("good")
+    assert [row for row in table if row["status"] == "ok"] == rows_of("good/results.csv")
     done = cli("batch", *inputs, *bad, "-o", "bad", "--jobs", "1", *QUICK)
     assert done.code == 1  # still
     assert f"{good + len(bad)} unchanged, 0 analysed, {len(bad)} failed" in done.err
@@ -156,9 +149,9 @@ def test_patterns_and_folders_in_folders_are_inputs(runs, cli):
     (runs / "late").mkdir()
     shutil.copy(runs / "run000.txt", runs / "late" / "run000.txt")
     cli("batch", "runs/late/run000.txt", "runs/run001.txt", "runs/run00[12].txt", "-o", "some", "--jobs", "1", *QUICK)
-    assert [row["run"] for row in rows("some")] == ["late/run000", "run001", "run002"]
+    assert [row["run"] for row in rows_of("some/results.csv")] == ["late/run000", "run001", "run002"]
     cli("batch", runs, "-o", "out", "--jobs", "1", *QUICK)
-    assert len(rows("out")) == 7
+    assert len(rows_of("out/results.csv")) == 7
 
 
 def test_runs_csv_gives_scenes_and_tags(runs, cli):
@@ -170,7 +163,7 @@ def test_runs_csv_gives_scenes_and_tags(runs, cli):
     done = cli("batch", runs, "--runs", "runs.csv", "-o", "out", "--jobs", "1", *QUICK)
     assert done.code == 0
     assert "runs.csv, line 5: gone.txt: no file of the inputs belongs to this row" in done.err
-    table = rows("out")
+    table = rows_of("out/results.csv")
     assert [row["group"] for row in table][:3] == ["", "A", "B"]
     assert table[1]["bob_mass_kg_u"] == "5e-05"
     assert {row["spring_mass_kg"] for row in table} == {"0.01"}
@@ -206,7 +199,7 @@ def test_patterns_of_a_table_in_a_folder_with_brackets_match(runs, cli):
     (folder / "runs.csv").write_text("path,group\nruns/run00[01].txt,7\n./runs/../runs/*5.txt,8\nrun003*,9\n")
     done = cli("batch", folder / "runs", "--runs", folder / "runs.csv", "-o", "out", "--jobs", "1", *QUICK)
     assert done.code == 0
-    assert [row["group"] for row in rows("out")] == ["7", "7", "", "9", "", "8"]
+    assert [row["group"] for row in rows_of("out/results.csv")] == ["7", "7", "", "9", "", "8"]
 
 
 def test_two_passes_do_not_share_a_folder(runs, cli):
@@ -229,7 +222,7 @@ def test_a_name_with_brackets_is_no_pattern_and_one_like_a_formula_is_text(runs,
     (runs / "run001.txt").rename(runs / " =1+1.txt")
     Path("runs.csv").write_text("path,bob_mass_kg\nruns/run [1].txt,0.2\nruns/ =1+1.txt,0.3\n", encoding="utf-8")
     assert cli("batch", "--runs", "runs.csv", "-o", "out", "--jobs", "1", *QUICK).code == 0
-    assert {row["run"]: row["bob_mass_kg"] for row in rows("out")} == {"run [1]": "0.2", "' =1+1": "0.3"}
+    assert {row["run"]: row["bob_mass_kg"] for row in rows_of("out/results.csv")} == {"run [1]": "0.2", "' =1+1": "0.3"}
     assert " =1+1" in list(springmass.results("out")["run"])
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from springmass.cli import main
 from springmass.course.results_csv import write_results
-from tests.courses import faulty_course, write_recording
+from tests.courses import faulty_course, rows_of, write_recording
 
 K, SPRING_KG, DIAMETER_M, RHO = 14.0, 0.010, 0.102, 1.199  # N/m, kg, m, kg/m3
 DRAG = {"thin": 5.0, "thick": 3.0}
@@ -73,8 +73,7 @@ def faulty(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_drag_of_the_disc_stands_beside_the_damping(course):
     """A prediction by diameter and air is the same for both discs, and of the size of what was measured."""
-    with (course / "results.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = rows_of(course / "results.csv")
     predicted = {disc: [float(row["disc_damping_rate"]) for row in rows if row["disc"] == disc] for disc in DRAG}
     assert predicted["thin"] == pytest.approx(predicted["thick"], rel=0.05)
     assert all(0.3 < float(row["damping_rate"]) / float(row["disc_damping_rate"]) < 3.0 for row in rows)

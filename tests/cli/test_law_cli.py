@@ -1,6 +1,5 @@
 """A damping law on the command line: stated by an option, a scene file or a table of runs."""
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +7,7 @@ import pytest
 
 import springmass
 from tests.cli.conftest import Cli
+from tests.courses import rows_of
 
 RUN = "undamped_simulated_position.txt"
 
@@ -39,9 +39,7 @@ def test_batch_takes_a_law_for_all_runs_and_for_each(cli: Cli, run: Path) -> Non
     folder = run.parent / "course"
     done = cli("batch", run, other, "--runs", table, "--law", "linear", "-o", folder, "--jobs", "1", "--reports", "0")
     assert done.code == 0, done.err
-    (results,) = folder.glob("*.csv")
-    with results.open(newline="") as file:
-        rows = {row["run"]: row for row in csv.DictReader(file)}
+    rows = {row["run"]: row for row in rows_of(folder / "results.csv")}
     assert {name: row["stated_law"] for name, row in rows.items()} == {"bob": "linear", "other": "quadratic"}
     assert rows["bob"]["law"] == rows["bob"]["one_law"] == "linear"
     table.write_text("path,law\nother.txt,cubic\n")

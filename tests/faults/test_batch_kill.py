@@ -3,7 +3,6 @@
 ``SPRINGMASS_KILLS`` sets the number of trials each way to a twelfth of it, and the course to its whole length.
 """
 
-import csv
 import os
 import random
 import signal
@@ -15,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from springmass.cli import main
-from tests.courses import contents, short_course
+from tests.courses import contents, rows_of, short_course
 
 TRIALS = max(1, int(os.environ.get("SPRINGMASS_KILLS", "12")) // 12)
 LIMIT_S = 300.0
@@ -85,8 +84,7 @@ def test_a_killed_pass_is_completed(place, tmp_path, who):
         assert not [pid for pid in below if is_worker(pid)]
         assert started(runs, out).wait(LIMIT_S) == 0
         assert contents(out) == clean
-        with (out / "results.csv").open(newline="") as file:
-            assert [row["run"] for row in csv.DictReader(file)] == [f"run{i:03d}" for i in range(RUNS)]
+        assert [row["run"] for row in rows_of(out / "results.csv")] == [f"run{i:03d}" for i in range(RUNS)]
 
 
 def used_s(pid: int) -> float:

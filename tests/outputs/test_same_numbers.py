@@ -1,7 +1,6 @@
 """One file gives one set of numbers: on the command line, in Python, in a report, in a course and on the page."""
 
 import contextlib
-import csv
 import io
 import json
 import math
@@ -16,6 +15,7 @@ from springmass.cli import main
 from springmass.errors import OK, UNREADABLE
 from springmass.page.feeds import view_of
 from springmass.page.live_analysis import Watcher
+from tests.courses import rows_of
 from tests.sampling import sampled
 
 RECORDINGS = Path(__file__).resolve().parents[2].parent / "shared" / "recordings"
@@ -83,8 +83,7 @@ def compare_all(path: Path, answers: Mapping[str, Any], folder: Path, accuracy: 
     if "velocity" not in answers:
         given = ["--accuracy", accuracy, *(f"--read={name}={value}" for name, value in answers.items())]
         run("batch", path, "-o", folder / "course", "--jobs", "1", "--reports", "0", *given)
-        with (folder / "course" / "results.csv").open(encoding="utf-8", newline="") as table:
-            (row,) = csv.DictReader(table)
+        (row,) = rows_of(folder / "course" / "results.csv")
         assert row["input_sha256"] == result["input"]["sha256"]
         assert json.loads(row["findings"]) == codes
         shared = [name for name in numbers if row.get(name)]

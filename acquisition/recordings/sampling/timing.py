@@ -298,7 +298,8 @@ def _in_bursts(path: str, t: F8, resolution: float, rate_hz: float | None) -> Ti
     # Samples are missing if the last stamp of a burst is further than one interval from its evenly spaced time.
     if rate_hz is None and np.abs(t[last] - (start + step * last)).max() >= interval:
         raise NeedsAnswer(Question(path, (rate_needed(),), reason=f"the times come in {bursts}, some missing"))
-    fit, u_rate = fit_clock(np.asarray(step * last, np.float64), np.rint(t[last] / NANO).astype(np.int64)), None
+    last_ns, u_rate = np.rint(t[last] / NANO).astype(np.int64), None
+    fit = fit_clock(np.asarray(step * last, np.float64), last_ns, step_s=step)
     if rate_hz is None and math.isfinite(fit.u_rate_error_ppm):
         step, u_rate = step / (1.0 + 1e-6 * fit.rate_error_ppm), 1e-6 * fit.u_rate_error_ppm
         start = float(np.mean(t[last] - step * last))

@@ -34,6 +34,8 @@ def decoded(adapter: Adapter, seconds: float = 20.0, seed: int = 0) -> tuple[Sen
         (Adapter(0.016, jitter_s=0.001), 1e-4),
         (Adapter(0.016, lost=0.05), 2e-3),
         (Adapter(0.24, step_s=0.02), 1e-4),
+        (Adapter(0.2, step_s=0.07), 1e-4),
+        (Adapter(1e-6, jitter_s=0.001, step_s=0.0991), 1e-4),
         (Adapter(0.002, waits=True), 3e-4),
         (Adapter(0.016, lost=0.01, waits=True), 1e-3),
     ],
@@ -57,6 +59,16 @@ def test_the_noise_behind_an_adapter_is_that_of_the_sensor() -> None:
     assert run.estimates["noise"].value == pytest.approx(NOISE_M, rel=0.1)
     assert abs(run.estimates["period"].value - PERIOD_S) < 4.0 * run.estimates["period"].u
     assert np.mean((run.flags & ~np.uint8(Flag.GAP_BEFORE)) == 0) > 0.99
+
+
+@pytest.mark.parametrize(("adapter", "seed"), [(Adapter(0.24, 0.01, 0.003, True), 17), (Adapter(0.24, 0.01), 13)])
+def test_a_part_between_wrong_places_of_lost_lines_has_a_larger_uncertainty(adapter: Adapter, seed: int) -> None:
+    """The times run off by a step until the next lost line: the part that the analysis chooses is within 3 u."""
+    chain, block, _ = decoded(adapter, 30.0, seed)
+    run = analyse(Loaded(Recording("wire", "", chain.info("port"), "", block), "wire").track)
+    period = run.estimates["period"]
+    assert "phase_jump" in {finding.code for finding in run.findings}
+    assert abs(period.value - PERIOD_S) < 3.0 * period.u
 
 
 def test_lines_at_no_even_rate_are_spread_between_their_reads() -> None:

@@ -9,6 +9,7 @@ from acquisition.recordings.families.motion_sensor import FORMAT
 from acquisition.recordings.reading import ReadOptions
 from acquisition.recordings.recording import Recording
 from tests.sampling import sampled
+from tests.unit.acquisition.recordings.test_format_traps import codes
 
 TITLE = "Motion Sensor Data File Sep 20, 2018 1:40 PM"
 POSITION = "Time (s)\tDistance (cm)\tDist Error (cm)"
@@ -23,11 +24,6 @@ def position_rows(count: int = 12, rate: float = 100.0, start: int = 0) -> list[
 def read(*lines: str, newline: str = "\n", **options: object) -> Recording:
     """Read a file of these lines, without newline after the last."""
     return FORMAT.read("run.txt", newline.join(lines).encode(), ReadOptions.of(options))
-
-
-def codes(recording: Recording) -> set[str]:
-    """Return what was seen on the way."""
-    return {trap.code for trap in recording.traps}
 
 
 @pytest.mark.parametrize("newline", sampled(["\r\n", "\n", "\r"], 1))

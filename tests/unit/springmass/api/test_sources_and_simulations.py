@@ -110,5 +110,3 @@ def test_a_step_of_ones_own_is_a_method() -> None:
     for wrong, said in ((t[::-1], "equally spaced"), (t + 1.0, "from 0"), (t[:1], "equally spaced")):
         with pytest.raises(sm.Error, match=said):
             sm.simulate(BENCH, wrong)
-    with pytest.raises(sm.Error, match="unstable"):
-        sm.simulate(BENCH, t, method="forward-euler")

@@ -1,6 +1,5 @@
 """The report of a run: its files, the numbers in them, and what must never stand in its page."""
 
-import csv
 import json
 import re
 import shutil
@@ -15,6 +14,7 @@ import springmass
 from springmass.charts.chart import to_json
 from springmass.charts.run import charts_of
 from springmass.cli import main
+from tests.courses import rows_of
 
 DATA = springmass.sample_data()
 
@@ -28,12 +28,6 @@ def reported(recording: Path, out: Path, *options: str) -> Path:
 def files_in(folder: Path) -> set[str]:
     """Return the names of every file below a folder."""
     return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-
-
-def rows_of(path: Path) -> list[dict[str, str]]:
-    """Return the rows of a CSV."""
-    with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def table(path: Path, y: np.ndarray, heading: str = "distance (m)") -> Path:

@@ -22,6 +22,7 @@ from storage.run_file.reading import RunFile, open_run
 from storage.wire_log.appending import WireLogWriter
 from storage.wire_log.records import LogHeader, RecordKind, SensorEntry
 from storage.wire_log.scanning import read_log
+from tests.unit.storage.recovery.test_parts import codes
 from tests.wire import append, bits, line
 
 FAMILY = "line-protocol"
@@ -65,11 +66,6 @@ def samples_of(path: Path) -> Block:
     """Return the samples of a run file."""
     with open_run(path) as run:
         return run.samples()
-
-
-def traps(run: RunFile) -> set[str]:
-    """Return the codes of a run's traps."""
-    return {trap.code for trap in run.traps}
 
 
 def test_a_recovered_run_is_what_was_seen_live(tmp_path: Path) -> None:
@@ -254,5 +250,5 @@ def test_what_a_sensor_did_not_give_is_named(tmp_path: Path) -> None:
         recorder.event(0, START_NS + 20_000_000_000, RunEnded(by="seconds"))
     (made,) = recover(tmp_path / "run.wire").runs
     with open_run(made.path) as run:
-        assert traps(run) == {"no_target", "sensor_lost"}
+        assert codes(run) == {"no_target", "sensor_lost"}
         assert np.flatnonzero(run.samples().flags & Flag.MISSING).tolist() == list(range(300, 500))
