@@ -37,7 +37,7 @@ _BESIDE = re.compile(  # beside a distance, and perhaps with its unit
 _OTHER = re.compile(
     r"(?:time|tiempo|temp|zeit|tijd|millis|micros|humid|feucht|press|druck|count|index|sample|muestra|baud|version|volt|"
     r"batt|echo|duration|dauer|duraci|puls|speed|veloc|geschw|accel|force|angle|winkel|light|delay).*|"
-    r"[tnivacfs]|nr|no|id|seq|line|port|us|ms"
+    r"[tnivcs]|nr|no|id|seq|line|port|us|ms"
 )
 
 # float() alone would also accept "nan", "inf" and "1_0". Digits of a word, a version or an address are not a number.

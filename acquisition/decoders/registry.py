@@ -80,7 +80,7 @@ def describe_bytes(data: bytes, unread: Mapping[str, Any] | None = None) -> Gues
         return Guess("looks like " + " or ".join(f"{get_family(name).title} [{name}]" for name in names))
     if len(set(data)) == 1:
         return Guess(f"{len(data)} bytes, all 0x{data[0]:02X}: a line held at one level, or the wrong baud rate?")
-    if is_text(data) and any(end in data for end in (b"\n", b"\r", b"*/")):
+    if is_text(data) and any(end in data for end in (b"\n", b"\r", b"*/", b"\x03")):
         return get_family("text-lines").decoder(**(unread or {})).unread(data)
     if is_text(data):
         start = data[:40].decode("ascii", "replace")
@@ -97,8 +97,8 @@ def describe_bytes(data: bytes, unread: Mapping[str, Any] | None = None) -> Gues
 
 
 def is_text(data: bytes) -> bool:
-    """Return whether nearly all bytes are printable characters, line ends and colours of a terminal."""
-    return sum(byte in b"\t\r\n\x1b" or 32 <= byte < 127 for byte in data) >= 0.9 * len(data)
+    """Return whether nearly all bytes are printable characters, ends of lines and frames, and colours of a terminal."""
+    return sum(byte in b"\x02\x03\t\r\n\x1b" or 32 <= byte < 127 for byte in data) >= 0.9 * len(data)
 
 
 def _frame_size(data: bytes) -> int | None:

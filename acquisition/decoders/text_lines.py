@@ -41,7 +41,7 @@ _ECHO_M_PER_US = 172e-6
 # So many steps in a row of a lone number, equal to this share, are those of a counter, or suspect at the beginning.
 _COUNTS, _EVEN, _SUSPECT = 50, 0.02, 12
 _NAME = re.compile(r"[A-Za-z_][\w .-]{0,31}", re.ASCII)
-OTHER_ENDS = (b"\r", b"*/")  # a carriage return alone, and the end of a frame of Serial Studio
+OTHER_ENDS = (b"\r", b"*/", b"\x03")  # a carriage return alone, the end of a frame of Serial Studio, and ETX
 _NOTED = 1000  # number of first distances that may raise a question
 _WORDS = re.compile("[\x80-\xff]+")
 _BESIDE_DIGIT = re.compile("[\x80-\xff][0-9.+-]|[0-9.+-][\x80-\xff]|(?<![\x80-\xff])[\x80-\xff](?![\x80-\xff])")
@@ -230,7 +230,7 @@ class TextLinesDecoder(FramedDecoder):
 def _text(line: bytes) -> str:
     """Return the text of a line, empty if it is noise, which may have digits too."""
     try:
-        text = uncoloured(line.decode().strip())
+        text = uncoloured(line.decode().strip("\x02 \t\r"))
     except UnicodeDecodeError:
         text = line.decode("latin-1").strip()
         if sum(letter > "~" for letter in text) > 2:

@@ -20,7 +20,7 @@ from pipeline.notice import Refusal
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import Fit
 from pipeline.numerics.levels import BARE_MENTION, ROUNDS, STRONG
-from pipeline.numerics.regression import DEGREE, solve_weighted
+from pipeline.numerics.regression import degree_of_curve, solve_weighted
 from pipeline.samples.condition import Samples
 from pipeline.track import F8, UNUSABLE, Bools, Quality
 from pipeline.windows.demodulate import Windows, model_error, with_prior
@@ -57,7 +57,7 @@ def fit_samples(fitted: Oscillation, samples: Samples) -> Oscillation:
     lags = {name: None if few and name in ("none", "linear") else phase.lag for name in laws}
     free = fitted.modes.samples
     last, reach = float(np.max(free.track.t[free.used])), float(np.max(np.abs(rows.t - phase.middle)))
-    degree = min(DEGREE, windows.t.size // 4 - 1) if fitted.rest.drifts else 0
+    degree = degree_of_curve(windows.t.size) if fitted.rest.drifts else 0
     model = Averaged(
         law=laws[first],
         t0=phase.t0,

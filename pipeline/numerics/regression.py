@@ -9,7 +9,7 @@ import numpy as np
 from numpy.polynomial import Legendre
 from numpy.typing import NDArray
 
-from pipeline.numerics.levels import OUTLIER
+from pipeline.numerics.levels import FEWEST_FOR_CURVE, FEWEST_FOR_MEDIAN, OUTLIER
 from pipeline.numerics.robust import mad_sigma, median
 from pipeline.track import F8
 
@@ -86,6 +86,11 @@ def covariance_of(jacobian: F8) -> F8:
     return root @ root.T if independent else unknown
 
 
+def degree_of_curve(points: int) -> int:
+    """Return the degree of a polynomial through points, of which three show a straight line."""
+    return min(DEGREE, max(points // 4 - 1, int(points >= FEWEST_FOR_MEDIAN)))
+
+
 def scatter(t: F8, y: F8, u: F8) -> Scatter:
     """Measure the scatter of points about a smooth curve that is independent of any damping law.
 
@@ -94,9 +99,9 @@ def scatter(t: F8, y: F8, u: F8) -> Scatter:
     eight points nothing is measured and ``u`` is kept.
     """
     n = t.size
-    degree = min(DEGREE, n // 4 - 1)
+    degree = degree_of_curve(n)
     everything = np.ones(n, np.bool_)
-    if degree < 1:
+    if n < FEWEST_FOR_CURVE:
         return Scatter(u, 0.0, everything, 1.0)
     design = np.polynomial.legendre.legvander(2.0 * (t - t[0]) / (t[-1] - t[0]) - 1.0, degree)
     share = math.sqrt(n / (n - degree - 1))
@@ -126,7 +131,7 @@ def smooth_curve(t: F8, y: F8, spread: Scatter) -> tuple[Legendre, float]:
     kept = spread.kept
     values, weight = y[kept], 1.0 / spread.u[kept]
     mean = float(np.average(values, weights=weight**2))
-    order = min(DEGREE, t.size // 4 - 1)
+    order = degree_of_curve(t.size)
     if order < 1:
         return Legendre([mean]), 0.0
     ends = [float(t[0]), float(t[-1])]

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from pipeline.errors import AnalysisError
 from pipeline.numerics.levels import (
     FALSE_ALARM,
-    FEWEST_FOR_CURVE,
     FEWEST_FOR_LINE,
+    FEWEST_FOR_MEDIAN,
     NOTICEABLE,
     OUTLIER,
     VERY_STRONG,
@@ -140,7 +140,7 @@ def _moved(windows: WindowSamples, fits: WindowFits, tuning: Tuning) -> F8 | Non
     that the samples do not follow.
     """
     good, t = fits.good, windows.centre
-    if np.count_nonzero(good) < FEWEST_FOR_CURVE:
+    if np.count_nonzero(good) < FEWEST_FOR_MEDIAN:
         return None
     squares, count = np.sum(fits.weights * fits.residual**2, axis=1)[good], fits.normal[good, 0, 0]
     u = np.maximum(np.sqrt(squares) / np.maximum(count - 3.0, 1.0), windows.tiny)

@@ -141,3 +141,19 @@ def test_steps_as_large_as_the_motion_are_part_of_the_uncertainties(step: float)
             assert "no_law_fits" not in codes(analysis)
     assert len(pulls) >= 4
     assert np.quantile(pulls, 0.9, axis=0).max() < 2.8
+
+
+@pytest.mark.parametrize("seconds", [2.6, 3.4, 4.5, 6.0, 6.6])
+@pytest.mark.parametrize("speed", [0.0, 0.02, 0.04])
+def test_a_rest_that_moves_is_followed_in_a_few_periods(seconds: float, speed: float) -> None:
+    """The period does not depend on it, and the drift is named; three periods show a straight line."""
+    t = np.arange(0.0, seconds, 0.01)
+    errors = []
+    for phase in np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False):
+        rng = np.random.default_rng([int(1000 * phase), int(10 * seconds)])
+        y = 0.3 + speed * t + 0.05 * np.exp(-0.01 * t) * np.cos(2 * np.pi * t / 0.79 + phase)
+        analysis = analyse(Track.from_arrays(t, y + 1e-3 * rng.standard_normal(t.size)))
+        period = analysis.estimates["period"]
+        errors.append((period.value - 0.79) / period.u)
+        assert ("rest_drift" in {each.code for each in analysis.findings}) == (speed > 0.0)
+    assert max(map(abs, errors)) < 4.0

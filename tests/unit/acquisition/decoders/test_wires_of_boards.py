@@ -28,6 +28,7 @@ def read(data: bytes, family: str = "text-lines", **options: object) -> Readings
         (lines("\x1b[0;32mI ({ms}) hcsr04: Distance: {d:.2f} cm\x1b[0m\r\n"), {}),
         (lines("{d:.2f}\r"), {}),
         (lines("Distance: {d:.2f} cm\r"), {}),
+        (lines("\x02{d:.2f}\x03"), {}),
         (lines("/*{mm:.1f},21.3*/"), {"column": 0, "separator": "comma", "unit": "mm"}),
         (lines("距离：{d:.2f}厘米\r\n", "gbk"), {}),
         (lines("Расстояние: {d:.2f} см\r\n", "cp1251"), {}),
@@ -61,14 +62,15 @@ def test_a_clock_goes_on_over_its_turn(begin: int, bits: int, signed: bool, unit
     assert len(readings) == len(DISTANCES_CM) - 1
 
 
-def test_two_sensors_in_turn_are_asked_about() -> None:
+@pytest.mark.parametrize(("first", "form"), [("Left", "{d:.2f} cm\r\nRight: 50.00 cm"), ("A", "{d:.2f}\r\nB: 50.00")])
+def test_two_sensors_in_turn_are_asked_about(first: str, form: str) -> None:
     """Lines of two names are no single distance; the option that the answer names reads one of them."""
-    data = lines("Left: {d:.2f} cm\r\nRight: 50.00 cm\r\n")
+    data = lines(f"{first}: {form}\r\n")
     decoder = get_family("text-lines").decoder()
     decoder.feed(0, data)
     assert decoder.refused
-    assert describe_bytes(data, {}).alternatives == ({"column": "Left"},)
-    distances = read(data, column="Left").distance_m
+    assert describe_bytes(data, {}).alternatives == ({"column": first},)
+    distances = read(data, column=first).distance_m
     np.testing.assert_allclose(distances, np.array(DISTANCES_CM[-distances.size :]) / 100)
     both = get_family("text-lines").decoder()
     both.feed(0, lines("Distance in cm: {d:.2f} cm\r\nDistance in mm: {mm:.1f} mm\r\n"))
