@@ -378,12 +378,14 @@ def _cause(lines: DecayingLines, number: int) -> Cause | None:
     # The other one must last for a few periods, or it is no oscillation but a disturbance at the start.
     if rates[other] > omegas[other] / (math.tau * FEWEST_FOR_MEDIAN):
         return None
-    weights = np.zeros(9)
+    weights, seconds = np.zeros(9), lines.record.seconds
     weights[[4 + 4 * number, 4 + 4 * other]] = 1.0, -NEGLIGIBLE
-    u = math.sqrt(float(weights @ lines.covariance @ weights))
-    # The other one falls to its half at least, far beyond its uncertainty.
-    falls = rates[other] > max(OUTLIER * u_rates[other], math.log(2.0) / lines.record.seconds)
-    if falls and float(weights @ lines.values) < -2.0 * u and (mains or (number == 0 and sizes[1] > WEAKER * sizes[0])):
+    slower = float(weights @ lines.values) < -2.0 * math.sqrt(float(weights @ lines.covariance @ weights))
+    # The other one falls to its half at least, far beyond its uncertainty. What is kept up does not; a free oscillation
+    # that falls slowly beside a swing that falls fast does.
+    falls = rates[other] > max(OUTLIER * u_rates[other], math.log(2.0) / seconds)
+    kept_up = slower and rates[number] < max(OUTLIER * u_rates[number], NOTICEABLE / seconds)
+    if falls and kept_up and (mains or (number == 0 and sizes[1] > WEAKER * sizes[0])):
         return "mains" if mains else "drive"
     if number == 0 or omegas[1] < HIGHEST_MODE * omegas[0] or sizes[1] < NEGLIGIBLE * sizes[0]:
         return None

@@ -70,9 +70,24 @@ def undamped_with_a_swing(seed: int) -> tuple[np.ndarray, np.ndarray]:
     return t, 0.3 + 0.05 * y + 3e-4 * rng.standard_normal(t.size)
 
 
+def falling_with_a_swing(seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return a run that falls slowly with a large sideways swing that falls often ten times as fast."""
+    rng = np.random.default_rng((seed, 24))
+    t = np.arange(0.0, rng.uniform(20.0, 60.0), 0.02)
+    omega, gamma, share = rng.uniform(6.0, 9.0), rng.uniform(0.002, 0.02), rng.uniform(0.2, 0.6)
+    y = np.exp(-gamma * t) * np.cos(omega * t + rng.uniform(0.0, 6.0))
+    y += share * np.exp(-rng.uniform(0.05, 0.3) * t) * np.cos(rng.uniform(0.35, 0.8) * omega * t + rng.uniform(0.0, 6.0))
+    return t, 0.3 + 0.05 * y + 3e-4 * rng.standard_normal(t.size)
+
+
 @pytest.mark.parametrize(
     ("make", "wrong"),
-    [(spring_pendulum, NAMED - RESONANT), (from_the_lowest_point, NAMED), (undamped_with_a_swing, NAMED)],
+    [
+        (spring_pendulum, NAMED - RESONANT),
+        (from_the_lowest_point, NAMED),
+        (undamped_with_a_swing, NAMED),
+        (falling_with_a_swing, NAMED),
+    ],
 )
 def test_what_only_looks_like_another_line_is_not_named(
     make: Callable[[int], tuple[np.ndarray, np.ndarray]], wrong: set[str]
