@@ -124,7 +124,7 @@ def _expanded(inputs: Sequence[str]) -> list[str]:
         if any(mark in text for mark in "*?[") and not os.path.exists(text):
             matched = sorted(glob.glob(text, recursive=True))
             if not matched:
-                raise ProgramError(f"{text}: no file matches this pattern", exit_code=UNREADABLE)
+                raise ProgramError(f"{text}: no file matches this pattern", "check the pattern", UNREADABLE)
             texts += matched
         else:
             texts.append(text)
