@@ -118,16 +118,17 @@ class Track:
             raise TrackError(f"flags must have the shape of t, {t_s.shape}, got {bits.shape}")
         if t_s.size < 2:
             raise TrackError(f"a track needs two samples at least, got {t_s.size}")
+        # An infinite time is as unknown as NaN, but only NaN passes through differences and cosines without a warning.
+        t_s[~np.isfinite(t_s)] = np.nan
         if rate_hz is None:
-            steps = np.diff(t_s)
-            steps = steps[np.isfinite(steps) & (steps > 0)]
-            if not steps.size:
+            with np.errstate(over="ignore"):
+                steps = np.diff(t_s)
+                steps = steps[np.isfinite(steps) & (steps > 0)]
+                rate_hz = float(np.round(1.0 / np.median(steps), 6)) if steps.size else None
+            if rate_hz is None:
                 raise TrackError(
                     "time never increases, so the rate is unknown", "give the samples in the order of their times"
                 )
-            rate_hz = float(np.round(1.0 / np.median(steps), 6))
-        # An infinite time is as unknown as NaN, but only NaN passes through a cosine without a warning.
-        t_s[~np.isfinite(t_s)] = np.nan
         for name, value in (("rate_hz", rate_hz), ("sigma_m", sigma_m), ("quantum_m", quantum_m)):
             if value is not None and not (np.isfinite(value) and value > 0):
                 raise TrackError(

@@ -76,7 +76,9 @@ def falling_with_a_swing(seed: int) -> tuple[np.ndarray, np.ndarray]:
     t = np.arange(0.0, rng.uniform(20.0, 60.0), 0.02)
     omega, gamma, share = rng.uniform(6.0, 9.0), rng.uniform(0.002, 0.02), rng.uniform(0.2, 0.6)
     y = np.exp(-gamma * t) * np.cos(omega * t + rng.uniform(0.0, 6.0))
-    y += share * np.exp(-rng.uniform(0.05, 0.3) * t) * np.cos(rng.uniform(0.35, 0.8) * omega * t + rng.uniform(0.0, 6.0))
+    y += (
+        share * np.exp(-rng.uniform(0.05, 0.3) * t) * np.cos(rng.uniform(0.35, 0.8) * omega * t + rng.uniform(0.0, 6.0))
+    )
     return t, 0.3 + 0.05 * y + 3e-4 * rng.standard_normal(t.size)
 
 
