@@ -1,34 +1,9 @@
-"""A sample of the goldens, and what counts as a move; `make golden` compares them all."""
-
-import shlex
+"""What counts as a move of a golden; `make golden` compares them all."""
 
 import pytest
 
-from tests.golden.commands import Table, Value, outcome
-from tests.golden.golden import VALUES, moves, parsed
-from tests.golden.inputs import Places, missing
-
-FROZEN = {
-    command: table
-    for path in sorted(VALUES.glob("*.txt"))
-    for command, table in parsed(path.read_text("utf-8")).items()
-}
-
-
-@pytest.fixture(scope="module")
-def places(tmp_path_factory: pytest.TempPathFactory) -> Places:
-    """Return the folders of the command lines."""
-    return Places(tmp_path_factory.mktemp("golden"))
-
-
-@pytest.mark.parametrize("command", list(FROZEN)[::40])
-def test_a_command_line_gives_what_was_frozen(places: Places, command: str) -> None:
-    """Numbers, codes, files and the exit code are those of the frozen outputs."""
-    if missing(shlex.split(command)):
-        pytest.skip("needs ../shared/recordings")
-    moved = moves(command, FROZEN[command], outcome(places, shlex.split(command)))
-    assert list(map(str, moved)) == []
-
+from tests.golden.commands import Table, Value
+from tests.golden.golden import moves
 
 @pytest.mark.parametrize(
     ("quantity", "before", "after", "moved"),
