@@ -5,6 +5,7 @@ import pytest
 from tests.golden.commands import Table, Value
 from tests.golden.golden import moves
 
+
 @pytest.mark.parametrize(
     ("quantity", "before", "after", "moved"),
     [
