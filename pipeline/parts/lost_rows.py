@@ -56,6 +56,8 @@ def find_lost_rows(samples: Samples, windows: Windows) -> LostRows | None:
         for _ in range(ROUNDS):
             # At most places no sample is lost, so the typical advance shows the true frequency.
             turn *= 1.0 + (median(_ahead(y, turn, length)) - 1.0) / length
+            if not 0.0 < turn < math.pi:
+                return found  # what is rounded to one value, or full of holes, has no phase that advances
             if (lost := _lost(y, turn, length)) is None:
                 break
             trial = replace(samples, track=replace(track, t=track.t + step_s * np.cumsum(lost)))

@@ -115,6 +115,8 @@ def test_any_times_are_analysed_or_refused(data: st.DataObject) -> None:
 @example(seed=0, seconds=3.0, omega=1.0, sigma_m=0.0, gamma=2.0, step_m=0.01, holes=0.875, echoes=0.25)
 @example(seed=0, seconds=3.0, omega=1.0, sigma_m=0.0, gamma=1.0, step_m=0.01, holes=0.875, echoes=0.25)
 @example(seed=0, seconds=2.0, omega=1.0, sigma_m=0.0, gamma=0.0, step_m=0.0, holes=0.875, echoes=0.25)
+@example(seed=0, seconds=5.0, omega=23.0, sigma_m=0.0, gamma=2.0, step_m=0.01, holes=0.0, echoes=0.0)
+@example(seed=0, seconds=5.0, omega=18.0, sigma_m=0.0, gamma=1.0, step_m=0.01, holes=0.0625, echoes=0.0)
 @example(seed=0, seconds=8.0, omega=8.5, sigma_m=0.0, gamma=1.0, step_m=0.0, holes=0.0, echoes=0.25)
 def test_any_oscillation_is_analysed_or_refused(
     seed: int, seconds: float, omega: float, sigma_m: float, gamma: float, step_m: float, holes: float, echoes: float
