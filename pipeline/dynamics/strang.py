@@ -33,9 +33,9 @@ def flow(omega: float, gamma: float, t: Any, of: Any = math) -> Any:
     The matrix is :math:`e^{-\\gamma t}(C + \\gamma S,\\ S;\\ -\\omega^2 S,\\ C - \\gamma S)`. Below critical damping
     :math:`C = \\cos(\\omega_d t)` and :math:`S = \\sin(\\omega_d t)/\\omega_d`. Above it, the entries use
     :math:`\\kappa = \\sqrt{(\\gamma-\\omega)(\\gamma+\\omega)}`, the fast rate :math:`\\gamma + \\kappa` and the slow
-    rate :math:`\\omega^2/(\\gamma+\\kappa)`, without differences of nearly equal numbers. A drive that strong has
-    :math:`\\gamma < 0`, and there the slow rate is :math:`\\gamma - \\kappa`. The functions are those of ``math``,
-    twenty times as fast for a single time, or with ``of=np`` those for an array of times.
+    rate :math:`\\omega^2/(\\gamma+\\kappa)`, without differences of nearly equal numbers. A drive has
+    :math:`\\gamma < 0`; if it is that strong, the slow rate is :math:`\\gamma - \\kappa`. The functions are those of
+    ``math``, twenty times as fast for a single time, or with ``of=np`` those for an array of times.
     """
     if abs(gamma) < omega:
         damped = math.sqrt((omega - gamma) * (omega + gamma))

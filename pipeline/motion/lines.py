@@ -194,7 +194,7 @@ class DecayingLines:
         )
 
     def _differs(self, number: int) -> bool:
-        """Return whether the parameter of a number of the first line differs significantly from the second one's."""
+        """Return whether the frequency (3) or the decay rate (4) of two lines differs significantly."""
         weights = np.zeros(self.values.size)
         weights[[number, number + 4]] = -1.0, 1.0
         return abs(float(weights @ self.values)) > SIGNIFICANT * math.sqrt(weights @ self.covariance @ weights)
